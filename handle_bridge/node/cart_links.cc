@@ -92,7 +92,9 @@ LinkFaults FaultsAt(const config::SimulatedUnit& unit, double session_time_s) {
 SimulatedInput FollowScript(const SceneView& scene, const config::CartConfig& cart, double session_time_s) {
   SimulatedInput input;
   for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
-    const ScriptPoint point = EvaluateScript(scene.script, tool, session_time_s);
+    const bool stays = scene.tools[tool].traction_N > 0 && cart.handles[tool].kind == config::LinkKind::kOperator;
+    const double time_s = stays ? std::min(session_time_s, LastHoldOf(scene.script, tool)) : session_time_s;
+    const ScriptPoint point = EvaluateScript(scene.script, tool, time_s);
     input.jaw_deg[tool] = kDegPerRad * point.jaw_rad;
     input.pedals = static_cast<std::uint8_t>(input.pedals | point.pedals);
     input.faults[tool] = FaultsAt(cart.handles[tool].simulated, session_time_s);

@@ -33,7 +33,7 @@ SimulatedDevice::SimulatedDevice(const HandModel& hand, std::shared_ptr<const Re
 
 Vec3d SimulatedDevice::Target(double session_time_s) noexcept {
   if (motion_) return map_.ToWorld(motion_->PositionAt(session_time_s));
-  point_ = EvaluateScript(script_, tool_, session_time_s);
+  point_ = EvaluateScript(script_, tool_, std::min(session_time_s, script_end_s_));
   return point_.present ? AttachPointForTip(trocar_, point_.p_W.cast<double>() + offset_) : rest_;
 }
 

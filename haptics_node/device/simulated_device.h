@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 
@@ -30,6 +31,8 @@ class SimulatedDevice final : public HapticDevice {
   /// The hand of an assistant: while the script's jaw is closed it pulls against the tissue until the force at the tip
   /// is this [N], wherever the tissue goes. 0: it follows the script alone.
   void set_traction(double traction_N) { traction_N_ = traction_N; }
+  /// The script stands still from this session time on [s].
+  void set_script_end(double session_time_s) { script_end_s_ = session_time_s; }
   /// Attach point of a tool that the script does not move [m].
   void set_rest(const Vec3d& p_WA) { rest_ = p_WA; }
   /// Share of the force that reaches the hand, 0 … 1.
@@ -53,6 +56,7 @@ class SimulatedDevice final : public HapticDevice {
   WorkspaceMap map_;
   double force_scale_ = 1;
   double traction_N_ = 0;
+  double script_end_s_ = std::numeric_limits<double>::infinity();
   Vec3d rest_;
 
   bool placed_ = false;

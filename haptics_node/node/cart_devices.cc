@@ -56,8 +56,8 @@ Vec3d RestOf(const SceneView& scene, std::uint32_t tool, const Trocar& trocar) {
                                                     : RestingAttachPoint(trocar);
 }
 
-std::unique_ptr<HapticDevice> MakeSimulated(const DeviceConfig& device, const SceneView& scene, const Trocar& trocar,
-                                            std::uint32_t tool, const WorkspaceMap& map) {
+std::unique_ptr<SimulatedDevice> MakeSimulated(const DeviceConfig& device, const SceneView& scene, const Trocar& trocar,
+                                               std::uint32_t tool, const WorkspaceMap& map) {
   const HandModel hand = HandOf(device.hand, scene.haptics);
   std::unique_ptr<SimulatedDevice> made;
   if (device.motion.empty()) {
@@ -124,7 +124,9 @@ CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& sce
       case DeviceKind::kSimulated: {
         const WorkspaceMap map =
             device.motion.empty() ? WorkspaceMap() : MapOf(cart, i, trocar.p_WP, "", trocars, &made.notes);
-        made.devices[i] = MakeSimulated(device, scene, trocar, i, map);
+        auto simulated = MakeSimulated(device, scene, trocar, i, map);
+        if (assists) simulated->set_script_end(LastHoldOf(scene.script, i));
+        made.devices[i] = std::move(simulated);
         break;
       }
       case DeviceKind::kOperator: {

@@ -48,6 +48,7 @@ void ReadPad(StrictMap map, const StrictMap::Choices<Way>& ways, const StrictMap
   for (std::size_t i = 0; i < kMotions.size(); ++i) {
     pad->motion[i] = motion.Choice(kMotions[i], pad->motion[i], ways);
   }
+  pad->turn = motion.Choice("turn", pad->turn, ways);
   StrictMap actions = map.MapOrDefaults("buttons");
   for (std::size_t i = 0; i < kPadActions; ++i) {
     const char* name = PadActionName(static_cast<PadAction>(i));

@@ -12,7 +12,7 @@ constexpr float kFog_per_s = 0.08f;  // At the hook itself; less with the distan
 constexpr float kFogMost = 0.6f;
 constexpr float kTrocar_m = 0.035f;  // Distance of the lens from the pivot below which it is wiped.
 constexpr float kWipe_per_s = 1;
-constexpr double kLongestStep_s = 0.1;  // A gap in the samples is no time at the lens.
+constexpr double kLongestGap_s = 0.1;  // A gap in the samples is no time at the lens.
 
 }  // namespace
 
@@ -30,7 +30,7 @@ bool Lens::Touches(const Vec3f& lens_W) const {
 
 void Lens::Step(double time_s, const ToolState& tools, bool delivers) {
   if (!scope_ || tools.tools[*scope_].kind != ToolKind::kScope || time_s <= last_s_) return;
-  const auto dt_s = static_cast<float>(last_s_ < 0 ? 0 : std::min(time_s - last_s_, kLongestStep_s));
+  const auto dt_s = static_cast<float>(last_s_ < 0 ? 0 : std::min(time_s - last_s_, kLongestGap_s));
   last_s_ = time_s;
   const Vec3f& lens_W = tools.tools[*scope_].p_WT;
   if (delivers && hook_) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "services/base/core/scene_view.h"
@@ -42,6 +43,17 @@ struct ScriptPoint {
   const auto between = [w](const auto& from, const auto& to) { return from + w * (to - from); };
   return {true,      a.p_W + w * (next->p_W - a.p_W),    between(a.jaw_rad, next->jaw_rad), a.pedals,
           a.power_W, between(a.roll_rad, next->roll_rad)};
+}
+
+/// Session time of the last key at which the tool's jaw is closed; infinite if it never is. Where a person operates the
+/// other tools, an assistant does not let go by the clock: its script stands still from then on.
+[[nodiscard]] inline double LastHoldOf(std::span<const ScriptKey> script, std::uint32_t tool) {
+  constexpr float kClosed_rad = 0.2f;
+  double last_s = std::numeric_limits<double>::infinity();
+  for (const ScriptKey& key : script) {
+    if (key.tool == tool && key.jaw_rad < kClosed_rad) last_s = static_cast<double>(key.time_s);
+  }
+  return last_s;
 }
 
 }  // namespace fulcrum

@@ -30,7 +30,8 @@ constexpr std::array<const char*, kPadButtons> kButtonNames{"a",
                                                             "first",
                                                             "second"};
 constexpr std::array<const char*, kPadActions> kActionNames{
-    "jaw", "jaw_lock", "left_tool", "right_tool", "coag", "cut", "fine", "steady", "clutch", "take", "release"};
+    "jaw", "jaw_lock", "left_tool", "right_tool", "third_tool", "fourth_tool", "coag",
+    "cut", "fine",     "steady",    "clutch",     "take",       "release"};
 
 /// Nothing: it is about the controls.
 std::optional<HandsKey> KeyOf(PadAction action) {
@@ -43,6 +44,10 @@ std::optional<HandsKey> KeyOf(PadAction action) {
       return HandsKey::kTool0;
     case PadAction::kTool1:
       return HandsKey::kTool1;
+    case PadAction::kTool2:
+      return HandsKey::kTool2;
+    case PadAction::kTool3:
+      return HandsKey::kTool3;
     case PadAction::kCoag:
       return HandsKey::kCoag;
     case PadAction::kCut:
@@ -75,6 +80,7 @@ const char* PadActionName(PadAction action) { return kActionNames[static_cast<st
 PadSettings PadSettings::OfSpaceMouse() {
   PadSettings settings;
   settings.motion = {PadDirection{PadAxis::kX}, PadDirection{PadAxis::kY}, PadDirection{PadAxis::kZ}};
+  settings.turn = PadDirection{PadAxis::kTurnZ};
   settings.buttons.fill(std::nullopt);
   settings.buttons[static_cast<std::size_t>(PadAction::kJaw)] = PadButton::kFirst;
   settings.buttons[static_cast<std::size_t>(PadAction::kCut)] = PadButton::kSecond;
@@ -89,6 +95,10 @@ Vec3f PadVelocity(const PadSettings& settings, const Vec3f& deflection) {
   }
   velocity.z() = std::copysign(Curve(std::abs(deflection.z()), settings.dead_zone), deflection.z());
   return settings.speed_m_s * velocity;
+}
+
+float PadTurn(const PadSettings& settings, float deflection) {
+  return settings.turn_rad_s * std::copysign(Curve(std::abs(deflection), settings.dead_zone), deflection);
 }
 
 float PadRumble(const PadSettings& settings, float force_N) {
@@ -120,8 +130,12 @@ PadHands::Outcome PadHands::Update(const PadState* state, std::int64_t now_ns, M
     if (way) deflection[static_cast<Eigen::Index>(i)] = way->sign * state->axes[static_cast<std::size_t>(way->axis)];
   }
   const Vec3f by = passed_s * PadVelocity(settings_, deflection);
-  if (hands->active() && !by.isZero()) {
+  const auto& turn = settings_.turn;
+  const float turned =
+      turn ? passed_s * PadTurn(settings_, turn->sign * state->axes[static_cast<std::size_t>(turn->axis)]) : 0.0f;
+  if (hands->active() && (!by.isZero() || turned != 0)) {
     hands->Push(by);
+    hands->Roll(turned);
     outcome.changed = true;
   }
   operates_ = operates_ || outcome.changed || outcome.take;

@@ -60,6 +60,8 @@ enum class PadAction : std::uint8_t {
   kJawLock,  ///< Jaw locked or unlocked.
   kTool0,
   kTool1,
+  kTool2,
+  kTool3,
   kCoag,
   kCut,
   kFine,    ///< A quarter of the motion while held.
@@ -68,7 +70,7 @@ enum class PadAction : std::uint8_t {
   kTake,
   kRelease
 };
-inline constexpr std::size_t kPadActions = 11;
+inline constexpr std::size_t kPadActions = 13;
 [[nodiscard]] const char* PadActionName(PadAction action);
 
 /// An axis, perhaps inverted.
@@ -85,18 +87,15 @@ struct PadSettings {
   /// What moves the tip to the right and up in the picture and along the view; nothing: no motion that way.
   std::array<std::optional<PadDirection>, 3> motion{PadDirection{PadAxis::kLeftX}, PadDirection{PadAxis::kLeftY},
                                                     PadDirection{PadAxis::kRightY}};
+  /// What turns the tool about its shaft, clockwise as seen from the handle; nothing: no turn.
+  std::optional<PadDirection> turn = PadDirection{PadAxis::kRightX};
+  float turn_rad_s = 1;  ///< At full deflection.
   /// By PadAction; nothing: no button does it.
-  std::array<std::optional<PadButton>, kPadActions> buttons{PadButton::kA,
-                                                            PadButton::kB,
-                                                            PadButton::kLeftShoulder,
-                                                            PadButton::kRightShoulder,
-                                                            PadButton::kLeftTrigger,
-                                                            PadButton::kRightTrigger,
-                                                            PadButton::kX,
-                                                            PadButton::kY,
-                                                            PadButton::kLeftStick,
-                                                            PadButton::kStart,
-                                                            PadButton::kBack};
+  std::array<std::optional<PadButton>, kPadActions> buttons{
+      PadButton::kA,   PadButton::kB,    PadButton::kLeftShoulder, PadButton::kRightShoulder,
+      PadButton::kUp,  PadButton::kDown, PadButton::kLeftTrigger,  PadButton::kRightTrigger,
+      PadButton::kX,   PadButton::kY,    PadButton::kLeftStick,    PadButton::kStart,
+      PadButton::kBack};
   /// Force at the tip at which the rumble begins, and at which it is strongest [N].
   float rumble_from_N = 0.5f, rumble_full_N = 3.3f;
 
@@ -137,6 +136,9 @@ class PadHands {
 /// Nothing within the dead zone, beyond it the cube of the rest, so that small motions are fine. The direction in the
 /// picture is that of the stick.
 [[nodiscard]] Vec3f PadVelocity(const PadSettings& settings, const Vec3f& deflection);
+
+/// Rate of the turn about the shaft for a deflection of -1 to 1 [rad/s]; dead zone and curve are those of the motion.
+[[nodiscard]] float PadTurn(const PadSettings& settings, float deflection);
 
 /// Strength of the rumble, 0 to 1, for a force at the tip [N].
 [[nodiscard]] float PadRumble(const PadSettings& settings, float force_N);

@@ -22,6 +22,8 @@ const char* NameOf(ToolKind kind) {
       return "Hook";
     case ToolKind::kScissors:
       return "Scissors";
+    case ToolKind::kScope:
+      return "Scope";
     default:
       return "Instrument";
   }

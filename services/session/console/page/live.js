@@ -5,11 +5,12 @@
 const live = (() => {
   const kBeat = 20;      // ms between two messages while the controls are taken; without one for 250 ms the tools stop.
   const kStick = 9;      // Pixels of the picture per beat at the end of a stick's way, or while an arrow key is held.
+  const kTwist = 1;      // Degrees about the shaft per beat at the end of a stick's way.
   const kTurn = 5;       // Degrees about the shaft for a press of q or e.
   const kTools = ['left tool', 'right tool', 'tool 3', 'tool 4'];
   const kKeys = {j: 'jaw', k: 'lock', f: 'cut', g: 'coag', 1: 'tool0', 2: 'tool1', 3: 'tool2', 4: 'tool3', v: 'steady', ' ': 'clutch', Shift: 'fine', Control: 'depth'};
   const kButtons = ['jaw', 'coag', 'cut'];  // Of the mouse: left, middle, right.
-  const kPadButtons = {0: 'jaw', 1: 'lock', 2: 'fine', 3: 'steady', 4: 'tool0', 5: 'tool1', 6: 'coag', 7: 'cut', 10: 'clutch'};
+  const kPadButtons = {0: 'jaw', 1: 'lock', 2: 'fine', 3: 'steady', 4: 'tool0', 5: 'tool1', 12: 'tool2', 13: 'tool3', 6: 'coag', 7: 'cut', 10: 'clutch'};
 
   let socket = null, connecting = false, seen = 0, hands = {controls: 'none'}, operated = false, running = false;
   let x = 0, y = 0, turn = 0, roll = 0;
@@ -229,6 +230,7 @@ const live = (() => {
     x += kStick * way(pad.axes[0] || 0);
     y -= kStick * way(pad.axes[1] || 0);
     turn -= 0.5 * way(pad.axes[3] || 0);
+    roll += kTwist * way(pad.axes[2] || 0);
     const pressed = new Set(Object.keys(kPadButtons).filter(i => pad.buttons[i] && pad.buttons[i].pressed));
     for (const i of pressed) if (!padDown.has(i)) press(kPadButtons[i], true);
     for (const i of padDown) if (!pressed.has(i)) press(kPadButtons[i], false);
