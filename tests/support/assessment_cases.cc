@@ -100,6 +100,40 @@ void AddLens(SceneView scene, std::vector<KnownAnswer>* answers) {
   answers->push_back({"lens_smeared.touch", ValueOf(assessor, Measure::kLensSmeared), 2.8});
 }
 
+/// A scope that looks straight down on a flat membrane and moves along the planned line, 1 mm beside it, over its first
+/// half.
+void AddView(const SceneView& assessed, std::vector<KnownAnswer>* answers) {
+  constexpr std::uint32_t kNodes = 41;
+  constexpr float kSpacing_m = 0.002f, kBeside_m = 0.001f, kSpeed_m_s = 0.005f;
+  std::vector<Vec3f> nodes;
+  std::vector<Vec2f> materials;
+  for (std::uint32_t i = 0; i < kNodes * kNodes; ++i) {
+    materials.emplace_back(kSpacing_m * static_cast<float>(i % kNodes), kSpacing_m * static_cast<float>(i / kNodes));
+    nodes.emplace_back(materials.back().x(), materials.back().y(), 0.0f);
+  }
+  SceneView scene = assessed;
+  scene.rest_position = nodes;
+  scene.membrane_material = materials;
+  scene.membrane = {.first = 0, .rows = kNodes, .cols = kNodes};
+  scene.assessment.tracing = LineTracing::kView;
+  scene.render.scope_angle_deg = 0;
+  scene.tools[2].kind = ToolKind::kScope;
+  Assessor assessor(scene);
+  assessor.Begin(kStart_ns);
+  for (int i = 0; i <= std::lround(4 / kToolPeriod_s); ++i) {
+    const double time_s = i * kToolPeriod_s;
+    ToolState state = ToolAt(time_s, Vec3d::Zero(), kAside);
+    state.tools[2].kind = ToolKind::kScope;
+    // The planned line runs 40 mm along y, from (20, 20) mm on.
+    state.tools[2].p_WT = {0.02f + kBeside_m, 0.02f + kSpeed_m_s * static_cast<float>(time_s), 0.05f};
+    state.tools[2].q_WT = Quatf(Eigen::AngleAxisf(std::numbers::pi_v<float>, Vec3f::UnitX()));
+    assessor.Add(state);
+  }
+  assessor.Finish();
+  answers->push_back({"line_done.view", ValueOf(assessor, Measure::kLineDone), 50});
+  answers->push_back({"deviation_mean.view", ValueOf(assessor, Measure::kDeviationMean), 1e3 * double{kBeside_m}});
+}
+
 /// A scope that turns about the vertical through the origin of W, where tool 0 is, with a tilted horizon.
 void AddScope(SceneView scene, std::vector<KnownAnswer>* answers) {
   constexpr double kTilt_deg = 7, kOff_deg = 11, kSession_s = 4;
@@ -423,6 +457,7 @@ std::vector<KnownAnswer> KnownAnswers() {
   std::vector<KnownAnswer> answers;
   AddMotions(scene.view, &answers);
   AddLens(scene.view, &answers);
+  AddView(scene.view, &answers);
   AddScope(scene.view, &answers);
   AddForces(scene.view, &answers);
   AddLines(scene.view, &answers);

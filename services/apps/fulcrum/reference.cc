@@ -86,8 +86,8 @@ ExitCode Reference(const Words& words) {
     const std::vector<std::string> lines = LinesOf(words[i]);
     const std::vector<KeyRule> rules = words[0] == "cart" ? config::CartRules(words[i]) : scene::SceneRules(words[i]);
     for (KeyRule rule : rules) {
-      // Both tools have the same keys.
-      for (const char* tool : {"tool0", "tool1"}) {
+      // All tools have the same keys.
+      for (const char* tool : {"tool0", "tool1", "tool2", "tool3"}) {
         if (const std::size_t at = rule.path.find(tool); at != std::string::npos) rule.path.replace(at, 5, "toolN");
       }
       const auto [at, is_new] = known.emplace(rule.path, entries.size());

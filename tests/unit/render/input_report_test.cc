@@ -39,7 +39,7 @@ TEST(InputReport, NamesEachDeviceAndAFixForEachTrouble) {
 TEST(InputReport, LiveShowsAxesAndWhatPressedButtonsDo) {
   const std::string text = InputsText(OneOfEach(), InputSettings(), true);
   EXPECT_NE(text.find("left_x +0.50  left_y +0.00  right_x +0.00  right_y +0.00\n"), std::string::npos) << text;
-  EXPECT_NE(text.find("pressed: a (jaw), up\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("pressed: a (jaw), up (third_tool)\n"), std::string::npos) << text;
 }
 
 TEST(InputReport, NothingIsOneClearLineAndWhatToDo) {
