@@ -1,5 +1,6 @@
 #include "render_node/geometry/glyphs.h"
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 
@@ -59,6 +60,9 @@ constexpr std::array<std::array<std::uint8_t, 7>, kCharacters.size()> kRows{{
     {0, 0, 0, 0, 12, 4, 8},                                      // ,
 }};
 
+constexpr int kLines = 270;      // Height of the picture [dots].
+constexpr int kSmallestDot = 3;  // [half pixels]
+
 }  // namespace
 
 int GlyphIndex(char character) {
@@ -66,20 +70,24 @@ int GlyphIndex(char character) {
   return place == std::string_view::npos ? 0 : static_cast<int>(place);
 }
 
-GlyphSheet MakeGlyphSheet() {
-  GlyphSheet sheet{kGlyphWidth * static_cast<int>(kCharacters.size()), kGlyphHeight, {}};
-  sheet.dots.assign(TexelIndex(0, sheet.height, sheet.width), 0);
+GlyphSheet MakeGlyphSheet(int half_pixels) {
+  const int glyph_width = kGlyphWidth * half_pixels / 2, height = kGlyphHeight * half_pixels / 2;
+  GlyphSheet sheet{glyph_width * static_cast<int>(kCharacters.size()), height, {}};
+  sheet.pixels.assign(TexelIndex(0, sheet.height, sheet.width), 0);
   for (std::size_t glyph = 0; glyph < kCharacters.size(); ++glyph) {
-    for (int row = 0; row < 7; ++row) {
-      for (int dot = 0; dot < 5; ++dot) {
-        if ((kRows[glyph][static_cast<std::size_t>(row)] >> (4 - dot)) & 1) {
-          const int x = kGlyphWidth * static_cast<int>(glyph) + dot, y = kGlyphHeight - 1 - row;
-          sheet.dots[TexelIndex(x, y, sheet.width)] = 255;
-        }
+    // Half pixels (x, y) of the glyph, y from the top: each is a quarter of a pixel, wholly within one dot.
+    for (int y = 0; y < 7 * half_pixels; ++y) {
+      for (int x = 0; x < 5 * half_pixels; ++x) {
+        if (((kRows[glyph][static_cast<std::size_t>(y / half_pixels)] >> (4 - x / half_pixels)) & 1) == 0) continue;
+        std::uint8_t& pixel =
+            sheet.pixels[TexelIndex(glyph_width * static_cast<int>(glyph) + x / 2, height - 1 - y / 2, sheet.width)];
+        pixel = static_cast<std::uint8_t>(std::min(255, pixel + 64));
       }
     }
   }
   return sheet;
 }
+
+int DotSize(int picture_height) { return std::max(kSmallestDot, 2 * picture_height / kLines); }
 
 }  // namespace fulcrum::render

@@ -1,4 +1,4 @@
-// A built-in bitmap font of five by seven dots for the text in the picture. Pure.
+// A built-in font of five by seven dots for the text in the picture, drawn at any size of the dots. Pure.
 #pragma once
 
 #include <cstdint>
@@ -7,16 +7,22 @@
 
 namespace fulcrum::render {
 
-inline constexpr int kGlyphWidth = 6;   ///< With one dot of space.
-inline constexpr int kGlyphHeight = 8;  ///< With one dot of space.
+inline constexpr int kGlyphWidth = 6;   ///< [dots], with one of space.
+inline constexpr int kGlyphHeight = 8;  ///< [dots], with one of space.
 
-/// All glyphs side by side, one byte per dot (0 or 255), bottom row first.
+/// All glyphs side by side, one byte per pixel (0 to 255), bottom row first.
 struct GlyphSheet {
   int width;
   int height;
-  std::vector<std::uint8_t> dots;
+  std::vector<std::uint8_t> pixels;
 };
-[[nodiscard]] GlyphSheet MakeGlyphSheet();
+/// @param half_pixels size of a dot in half pixels, at least 2. A pixel that a dot covers in part has a part of its
+/// brightness. A glyph is 3 * half_pixels wide and 4 * half_pixels high [pixels].
+[[nodiscard]] GlyphSheet MakeGlyphSheet(int half_pixels);
+
+/// Size of a dot [half pixels] in a picture of this height [pixels]: the height of a capital is 2.6 % of the picture's,
+/// in steps of 3.5 pixels, but never less than 10 pixels.
+[[nodiscard]] int DotSize(int picture_height);
 
 /// Index of the character's glyph on the sheet; lower-case letters are drawn as capitals, unknown characters as a
 /// space.

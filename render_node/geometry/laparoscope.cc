@@ -1,5 +1,6 @@
 #include "render_node/geometry/laparoscope.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "services/base/core/scope.h"
@@ -15,6 +16,9 @@ constexpr float kFibreOffset = 0.004f;  // [m]
 constexpr float kBeamTilt = 0.25f;
 // Radius of the circle relative to the picture's height: it is cut by the edges, as with a zoomed camera head.
 constexpr float kCircle = 0.70f;
+
+// The widest picture that a scene can ask for; a wider one might exceed the largest texture.
+constexpr int kWidest = 7680;  // [pixels]
 
 }  // namespace
 
@@ -49,6 +53,17 @@ Laparoscope MakeLaparoscope(const RenderParams& params) {
   scope.picture_centre = Vec2f(width / 2, height / 2);
   scope.circle_radius = kCircle * height;
   return scope;
+}
+
+PixelBox FitPicture(const RenderParams& params, int window_width, int window_height) {
+  const double aspect = static_cast<double>(params.width) / static_cast<double>(params.height);
+  const double most = std::min(window_width, kWidest);
+  const double width = std::min(most, std::min(window_height, kWidest) * aspect);
+  PixelBox box{0, 0, std::max(1, static_cast<int>(std::lround(width))),
+               std::max(1, static_cast<int>(std::lround(width / aspect)))};
+  box.x = (window_width - box.width) / 2;
+  box.y = (window_height - box.height) / 2;
+  return box;
 }
 
 }  // namespace fulcrum::render

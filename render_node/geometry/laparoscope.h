@@ -21,4 +21,14 @@ struct Laparoscope {
 /// over the height.
 [[nodiscard]] Laparoscope MakeLaparoscope(const RenderParams& params);
 
+/// A rectangle of a window [pixels]; (x, y) is its lower left corner.
+struct PixelBox {
+  int x = 0, y = 0, width = 0, height = 0;
+  bool operator==(const PixelBox&) const = default;
+};
+
+/// The largest box with the scene's aspect in the middle of a window: the picture keeps its shape, bars remain beside
+/// it. At least one pixel wide and high, at most as large as the picture of a scene may be.
+[[nodiscard]] PixelBox FitPicture(const RenderParams& params, int window_width, int window_height);
+
 }  // namespace fulcrum::render

@@ -13,6 +13,8 @@ constexpr double kBudget_ms = 28;  // Of the 33 ms at 30 pictures a second, with
 constexpr double kStepCost = 1.5;  // A step finer costs up to this factor more.
 constexpr int kCalmWindows = 6;    // About two seconds, to prevent oscillation.
 constexpr float kFewestLines = 270;
+constexpr float kHalf = 0.52f;            // A coarser step is for large pictures only …
+constexpr float kFewestLinesLarge = 374;  // … which have at least as many lines then.
 
 }  // namespace
 
@@ -29,18 +31,31 @@ Quality QualityFromName(std::string_view name) {
   throw InputError("--quality: \"" + std::string(name) + "\"; valid: auto, low, high");
 }
 
-QualityControl::QualityControl(Quality quality, int height)
-    : automatic_(quality == Quality::kAuto), first_(automatic_) {
-  while (last_step_ + 1 < kScales.size() && kScales[last_step_ + 1] * static_cast<float>(height) >= kFewestLines) {
-    ++last_step_;
-  }
-  if (quality == Quality::kLow) {
+QualityControl::QualityControl(Quality quality, int height) : quality_(quality), first_(quality == Quality::kAuto) {
+  SetHeight(height);
+}
+
+void QualityControl::SetHeight(int height) {
+  const float lines = kScales[step_] * static_cast<float>(height_);
+  const auto enough = [height](float scale) {
+    return scale * static_cast<float>(height) >= (scale < kHalf ? kFewestLinesLarge : kFewestLines);
+  };
+  last_step_ = 0;
+  while (last_step_ + 1 < kScales.size() && enough(kScales[last_step_ + 1])) ++last_step_;
+  if (quality_ == Quality::kLow) {
     step_ = last_step_;
+  } else if (quality_ == Quality::kAuto && height_ > 0) {
+    step_ = 0;
+    while (step_ < last_step_ && kScales[step_] * static_cast<float>(height) > lines) ++step_;
+    first_ = true;
+    count_ = 0;
+    calm_ = 0;
   }
+  height_ = height;
 }
 
 void QualityControl::Add(double draw_ms) {
-  if (!automatic_) {
+  if (quality_ != Quality::kAuto) {
     return;
   }
   if (std::exchange(first_, false)) {
@@ -52,12 +67,12 @@ void QualityControl::Add(double draw_ms) {
   }
   count_ = 0;
   std::nth_element(cost_ms_.begin(), cost_ms_.begin() + kWindow / 2, cost_ms_.end());
-  const double median_ms = cost_ms_[kWindow / 2];
+  double median_ms = cost_ms_[kWindow / 2];
   calm_ = median_ms * kStepCost < kBudget_ms ? calm_ + 1 : 0;
   if (median_ms > kBudget_ms && step_ < last_step_) {
     ++step_;
-  } else if (calm_ >= kCalmWindows && step_ > 0) {
-    --step_;
+  } else if (calm_ >= kCalmWindows) {
+    for (; step_ > 0 && median_ms * kStepCost < kBudget_ms; --step_) median_ms *= kStepCost;
     calm_ = 0;
   }
 }

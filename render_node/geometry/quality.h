@@ -17,22 +17,28 @@ enum class Quality { kAuto, kLow, kHigh };
 /// The first picture is drawn coarsely, because a session waits for it after a restart.
 class QualityControl {
  public:
-  /// `height` of the picture [pixels]: the scene never has fewer than 270 lines, or as many as the picture.
+  /// `height` of the picture [pixels]: the scene never has fewer than 270 lines, or as many as the picture; nor fewer
+  /// than 374 at a scale below 0.52.
   QualityControl(Quality quality, int height);
 
+  /// The picture has another height [pixels]. With kAuto the scene gets no more lines than it had, as far as there is a
+  /// scale for it; finer steps follow as above.
+  void SetHeight(int height);
   /// Adds the drawing time of one picture [ms].
   void Add(double draw_ms);
   [[nodiscard]] float scale() const { return kScales[first_ ? last_step_ : step_]; }
 
  private:
   // Each step has about 0.7 of the pixels of the one before.
-  static constexpr std::array<float, 5> kScales{1.0f, 0.85f, 0.72f, 0.61f, 0.52f};
+  static constexpr std::array<float, 13> kScales{1.0f,  0.85f, 0.72f, 0.61f, 0.52f, 0.44f, 0.37f,
+                                                 0.31f, 0.26f, 0.22f, 0.19f, 0.16f, 0.13f};
   static constexpr std::size_t kWindow = 9;
 
-  bool automatic_;
-  bool first_;
+  Quality quality_;
+  int height_ = 0;
+  bool first_;  // The next picture is drawn coarsely and not counted.
   std::size_t step_ = 0;
-  std::size_t last_step_ = 0;  // Coarsest step with at least kFewestLines lines.
+  std::size_t last_step_ = 0;  // Coarsest step with enough lines.
   std::array<double, kWindow> cost_ms_{};
   std::size_t count_ = 0;
   int calm_ = 0;  // Consecutive windows that would permit a finer step.

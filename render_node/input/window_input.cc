@@ -109,6 +109,10 @@ class WindowInput::Connection {
         return HandleButton(event.xbutton.button, event.type == ButtonPress, hands);
       case MotionNotify:
         return HandleMotion(event.xmotion.x, event.xmotion.y, hands);
+      case ConfigureNotify:
+        // The window has moved beneath the pointer: that is no motion of the hand.
+        if (hands->active()) FindPointer();
+        return false;
       case FocusOut:
         // A grab of the window manager, as for Alt+Tab, is no loss of the window.
         if (!hands->active() || event.xfocus.mode == NotifyGrab) return false;

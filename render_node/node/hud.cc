@@ -63,8 +63,9 @@ std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
       line += 2;
     }
   }
+  int right = 2 * line;
   if (state.help && state.hands && state.hands->gamepad) {
-    for (const std::string& text : PadHelp(state.gamepad)) texts.push_back({Corner::kTopRight, line++, text});
+    for (const std::string& text : PadHelp(state.gamepad)) texts.push_back({Corner::kTopRight, right++, text});
   }
   line = 0;
   for (const std::string& late : state.late) {
@@ -99,9 +100,10 @@ std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
     }
   }
   if (state.help) {
-    for (const std::string_view key : {"ARROWS TURN", "+ - NEARER, FARTHER", "R T ROLL", "0 RESET VIEW",
-                                       "L LOCK ON TOOL", "S SCREENSHOT", "P PAUSE", "U FIGURES", "H HELP"}) {
-      texts.push_back({Corner::kTopLeft, ++line, std::string(key)});
+    for (const std::string_view key :
+         {"ARROWS TURN", "+ - NEARER, FARTHER", "R T ROLL", "0 RESET VIEW", "L LOCK ON TOOL", "S SCREENSHOT", "P PAUSE",
+          "U FIGURES", "F11 FULL SCREEN", "H HELP"}) {
+      texts.push_back({Corner::kTopRight, right++, std::string(key)});
     }
   }
   if (!figures) {

@@ -41,6 +41,7 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
       stage_(stage ? std::move(stage) : std::make_unique<Stage>(scene, settings.window)),
       view_(stage_->view),
       display_(*stage_->display),
+      shape_{0, 0, static_cast<int>(scene.render.width), static_cast<int>(scene.render.height)},
       writer_(settings.frames),
       quality_(settings.quality, static_cast<int>(scene.render.height)),
       operator_stamper_(runtime::MonotonicNs()),
@@ -70,6 +71,7 @@ std::int64_t RenderNode::PeriodNs(std::int64_t cart_ns) const {
 void RenderNode::Step(const Tick& tick) {
   session_time_s_ = tick.session_time_s;
   TakeKeys();
+  TakeSize();
   if (hud_.paused) {
     PassOver();
   } else {
@@ -246,6 +248,17 @@ void RenderNode::TakeKeys() {
   }
 }
 
+void RenderNode::TakeSize() {
+  const PixelBox shape = display_.picture();
+  if (shape == shape_) return;
+  if (shape.width != shape_.width || shape.height != shape_.height) {
+    view_.SetSize(shape.width, shape.height);
+    quality_.SetHeight(shape.height);
+  }
+  shape_ = shape;
+  changed_on_screen_ = true;
+}
+
 HandsView RenderNode::ViewNow() const {
   const RenderParams& camera = camera_.params();
   const Eigen::Matrix4f view = MakeLaparoscope(camera).view;
@@ -255,7 +268,7 @@ HandsView RenderNode::ViewNow() const {
   hands.right = view.row(0).head<3>().transpose();
   hands.up = view.row(1).head<3>().transpose();
   hands.forward = -view.row(2).head<3>().transpose();
-  hands.pixel = 2.0f * std::tan(0.5f * kRadPerDeg * camera.fov_deg) / static_cast<float>(camera.height);
+  hands.pixel = 2.0f * std::tan(0.5f * kRadPerDeg * camera.fov_deg) / static_cast<float>(shape_.height);
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     hands.present[i] = tools_.tools[i].kind != ToolKind::kNone && !(scene_.tools[i].traction_N > 0);
     hands.scope[i] = tools_.tools[i].kind == ToolKind::kScope;
@@ -325,6 +338,9 @@ void RenderNode::Press(int key) {
       return;
     case 'u':
       figures_ = !figures_;
+      return;
+    case osgGA::GUIEventAdapter::KEY_F11:
+      display_.ToggleFullScreen();
       return;
     case 'h':
       hud_.help = !hud_.help;

@@ -94,6 +94,8 @@ class RenderNode {
   void TakeGenerator();
   void TakeContact();
   void TakeKeys();
+  /// Follows the size of the window.
+  void TakeSize();
   void UpdateHands();
   /// Where the pixels of the picture lie, and the tools.
   [[nodiscard]] HandsView ViewNow() const;
@@ -110,6 +112,7 @@ class RenderNode {
   std::unique_ptr<Stage> stage_;
   LaparoscopeView& view_;
   Display& display_;
+  PixelBox shape_;  ///< Of the picture.
   FrameWriter writer_;
   QualityControl quality_;
   bus::Stamper operator_stamper_;  ///< Of the thread of hands_.

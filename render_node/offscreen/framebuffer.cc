@@ -32,19 +32,19 @@ Framebuffer::~Framebuffer() {
 
 void Framebuffer::Read(Bitmap* picture) {
   glBindFramebuffer(GL_FRAMEBUFFER, id_);
-  ReadBoundFramebuffer(width_, height_, picture);
+  ReadBoundFramebuffer(0, 0, width_, height_, picture);
 }
 
 void CopyTexture(unsigned from, unsigned to, int width, int height) {
   glCopyImageSubData(from, GL_TEXTURE_2D, 0, 0, 0, 0, to, GL_TEXTURE_2D, 0, 0, 0, 0, width, height, 1);
 }
 
-void ReadBoundFramebuffer(int width, int height, Bitmap* picture) {
+void ReadBoundFramebuffer(int x, int y, int width, int height, Bitmap* picture) {
   picture->width = width;
   picture->height = height;
   picture->rgb.resize(3u * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glReadPixels(0, 0, width, height, GL_RGB, GL_UNSIGNED_BYTE, picture->rgb.data());
+  glReadPixels(x, y, width, height, GL_RGB, GL_UNSIGNED_BYTE, picture->rgb.data());
 }
 
 }  // namespace fulcrum::render

@@ -40,7 +40,7 @@ class Framebuffer {
 /// (OpenGL 4.3).
 void CopyTexture(unsigned from, unsigned to, int width, int height);
 
-/// Reads the picture of the window or framebuffer that is bound for reading.
-void ReadBoundFramebuffer(int width, int height, Bitmap* picture);
+/// Reads a part of the window or framebuffer that is bound for reading; (x, y) is its lower left corner.
+void ReadBoundFramebuffer(int x, int y, int width, int height, Bitmap* picture);
 
 }  // namespace fulcrum::render

@@ -35,6 +35,7 @@ class OffscreenDisplay : public Display {
     context_.MakeCurrent();
     viewer_ = new osgViewer::Viewer;
     const int width = static_cast<int>(params.width), height = static_cast<int>(params.height);
+    picture_ = {0, 0, width, height};
     framebuffer_ = std::make_unique<Framebuffer>(width, height);
     window_ = viewer_->setUpViewerAsEmbeddedInWindow(0, 0, width, height);
     window_->setDefaultFboId(framebuffer_->id());
@@ -68,11 +69,13 @@ class OffscreenDisplay : public Display {
   }
 
   [[nodiscard]] std::vector<int> TakeKeys() override { return {}; }
+  [[nodiscard]] PixelBox picture() const override { return picture_; }
   [[nodiscard]] bool closed() const override { return false; }
   [[nodiscard]] std::string description() const override { return context_.description(); }
 
  private:
   EglContext context_;
+  PixelBox picture_{};
   std::unique_ptr<Framebuffer> framebuffer_;
   osg::ref_ptr<osgViewer::Viewer> viewer_;
   osg::ref_ptr<osgViewer::GraphicsWindowEmbedded> window_;
@@ -80,17 +83,41 @@ class OffscreenDisplay : public Display {
 
 class ReadAfterDraw : public osg::Camera::DrawCallback {
  public:
-  ReadAfterDraw(int width, int height) : width_(width), height_(height) {}
-  void operator()(osg::RenderInfo&) const override {
-    if (picture != nullptr) {
-      ReadBoundFramebuffer(width_, height_, picture);
-    }
+  void operator()(osg::RenderInfo& info) const override {
+    if (picture == nullptr) return;
+    const osg::Viewport& box = *info.getCurrentCamera()->getViewport();
+    ReadBoundFramebuffer(static_cast<int>(box.x()), static_cast<int>(box.y()), static_cast<int>(box.width()),
+                         static_cast<int>(box.height()), picture);
   }
   Bitmap* picture = nullptr;
+};
+
+/// Blackens the whole window, because OpenSceneGraph clears the camera's viewport only.
+class ClearBars : public osg::Camera::DrawCallback {
+ public:
+  void operator()(osg::RenderInfo& info) const override {
+    info.getState()->applyMode(GL_SCISSOR_TEST, false);
+    glClearColor(0, 0, 0, 1);
+    glClear(GL_COLOR_BUFFER_BIT);
+  }
+};
+
+/// Instead of OpenSceneGraph's way, which stretches the viewport with the window.
+class KeepShape : public osg::GraphicsContext::ResizedCallback {
+ public:
+  KeepShape(osg::Camera* camera, const RenderParams& params) : camera_(camera), params_(params) {}
+  void resizedImplementation(osg::GraphicsContext* context, int x, int y, int width, int height) override {
+    context->resizedImplementation(x, y, width, height);
+    Fit(width, height);
+  }
+  void Fit(int width, int height) {
+    const PixelBox box = FitPicture(params_, width, height);
+    camera_->setViewport(box.x, box.y, box.width, box.height);
+  }
 
  private:
-  int width_;
-  int height_;
+  osg::Camera* camera_;  // Outlives the window.
+  RenderParams params_;
 };
 
 class Keyboard : public osgGA::GUIEventHandler {
@@ -108,8 +135,7 @@ class Keyboard : public osgGA::GUIEventHandler {
 
 class WindowDisplay : public Display {
  public:
-  WindowDisplay(const LaparoscopeView& view, const RenderParams& params)
-      : read_(new ReadAfterDraw(static_cast<int>(params.width), static_cast<int>(params.height))) {
+  WindowDisplay(const LaparoscopeView& view, const RenderParams& params) {
     osg::GraphicsContext::WindowingSystemInterface* system = osg::GraphicsContext::getWindowingSystemInterface();
     osg::GraphicsContext::ScreenIdentifier screen;
     screen.readDISPLAY();
@@ -125,7 +151,7 @@ class WindowDisplay : public Display {
     traits->height = static_cast<int>(params.height);
     traits->doubleBuffer = true;
     traits->windowDecoration = true;
-    traits->supportsResize = false;
+    traits->supportsResize = true;
     traits->windowName = "Fulcrum";
     context_ = osg::GraphicsContext::createGraphicsContext(traits);
     if (!context_) {
@@ -133,7 +159,10 @@ class WindowDisplay : public Display {
     }
     SetUpState(context_->getState());
     viewer_.getCamera()->setGraphicsContext(context_);
-    viewer_.getCamera()->setViewport(0, 0, traits->width, traits->height);
+    const osg::ref_ptr<KeepShape> shape = new KeepShape(viewer_.getCamera(), params);
+    shape->Fit(traits->width, traits->height);
+    context_->setResizedCallback(shape);
+    viewer_.getCamera()->setInitialDrawCallback(new ClearBars);
     viewer_.getCamera()->setFinalDrawCallback(read_);
     SetUpViewer(view, &viewer_);
     viewer_.addEventHandler(keys_);
@@ -143,6 +172,7 @@ class WindowDisplay : public Display {
     }
     // The context is passed from the thread that opens the window to the thread that draws.
     viewer_.setReleaseContextAtEndOfFrameHint(true);
+    window_ = std::make_unique<X11Window>(context_.get());
   }
 
   void Draw() override { viewer_.frame(); }
@@ -161,15 +191,22 @@ class WindowDisplay : public Display {
   }
 
   [[nodiscard]] bool clicked() const override { return keys_->clicked; }
-  [[nodiscard]] unsigned long window() const override { return X11WindowOf(context_.get()); }
+  [[nodiscard]] unsigned long window() const override { return window_->id(); }
+  [[nodiscard]] PixelBox picture() const override {
+    const osg::Viewport& box = *viewer_.getCamera()->getViewport();
+    return {static_cast<int>(box.x()), static_cast<int>(box.y()), static_cast<int>(box.width()),
+            static_cast<int>(box.height())};
+  }
+  void ToggleFullScreen() override { window_->ToggleFullScreen(); }
   [[nodiscard]] bool closed() const override { return viewer_.done(); }
   [[nodiscard]] std::string description() const override { return "window"; }
 
  private:
-  osg::ref_ptr<ReadAfterDraw> read_;
+  osg::ref_ptr<ReadAfterDraw> read_ = new ReadAfterDraw;
   osg::ref_ptr<Keyboard> keys_ = new Keyboard;
   osg::ref_ptr<osg::GraphicsContext> context_;
   osgViewer::Viewer viewer_;
+  std::unique_ptr<X11Window> window_;
 };
 
 }  // namespace

@@ -22,6 +22,10 @@ class Display {
   [[nodiscard]] virtual std::vector<int> TakeKeys() = 0;
   /// True if the window was clicked since the last call of TakeKeys().
   [[nodiscard]] virtual bool clicked() const { return false; }
+  /// Size of the picture [pixels]. Of a window it is the largest box with the scene's aspect; the rest is black.
+  [[nodiscard]] virtual PixelBox picture() const = 0;
+  /// Makes the window as large as the screen, or again as it was before. Off screen: no effect.
+  virtual void ToggleFullScreen() {}
   /// Number of the X11 window; 0: none.
   [[nodiscard]] virtual unsigned long window() const { return 0; }
   /// True after the user has closed the window.

@@ -219,13 +219,23 @@ void LaparoscopeView::SetJaw(int tool, float angle_rad) {
   impl_->optics.SceneChanged();
 }
 
+void LaparoscopeView::SetSize(int width, int height) {
+  RenderParams& render = impl_->scene.render;
+  render.width = static_cast<std::uint32_t>(width);
+  render.height = static_cast<std::uint32_t>(height);
+  impl_->scope = MakeLaparoscope(render);
+  impl_->layers.SetScope(impl_->scope);
+  impl_->optics.SetSize(impl_->scope, width, height);
+  impl_->overlay.SetSize(width, height);
+}
+
 void LaparoscopeView::SetCamera(const RenderParams& params) {
-  RenderParams wanted = impl_->scene.render;
-  wanted.scope_tip_W = params.scope_tip_W;
-  wanted.scope_target_W = params.scope_target_W;
-  wanted.roll_deg = params.roll_deg;
-  wanted.fov_deg = params.fov_deg;
-  impl_->scope = MakeLaparoscope(wanted);
+  RenderParams& render = impl_->scene.render;
+  render.scope_tip_W = params.scope_tip_W;
+  render.scope_target_W = params.scope_target_W;
+  render.roll_deg = params.roll_deg;
+  render.fov_deg = params.fov_deg;
+  impl_->scope = MakeLaparoscope(render);
   impl_->layers.SetScope(impl_->scope);
   impl_->optics.SetScope(impl_->scope);
   impl_->ShineFrom(impl_->scope);

@@ -39,6 +39,8 @@ class LaparoscopeView {
   /// Advances smoke and blood. Returns true if the picture changes or will change by that.
   bool UpdateEffects(double session_time_s);
 
+  /// Size of the picture [pixels], of the scene's aspect but for rounding.
+  void SetSize(int width, int height);
   /// Sets the camera's position, target, roll and field of view from `params`; the size does not change.
   void SetCamera(const RenderParams& params);
   /// 0: clear lens … 1: nothing to be seen.

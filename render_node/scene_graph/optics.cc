@@ -89,7 +89,23 @@ Optics::Optics(const Laparoscope& scope, int width, int height, osg::Node* backg
   scene_.camera->addChild(copy);
   AddField();
   SetScope(scope);
-  SetScale(1);
+  UseScale();
+}
+
+void Optics::SetSize(const Laparoscope& scope, int width, int height) {
+  scope_ = scope;
+  width_ = width;
+  height_ = height;
+  for (const Target& target : {background_, scene_}) {
+    for (osg::Texture2D* texture : {target.colour.get(), target.depth.get()}) {
+      texture->setTextureSize(width, height);
+      texture->dirtyTextureObject();
+    }
+    // Without this OpenSceneGraph keeps the framebuffer of the previous textures.
+    target.camera->dirtyAttachmentMap();
+    target.camera->setProjectionMatrix(ToOsg(scope.projection));
+  }
+  UseScale();
 }
 
 Optics::Target Optics::MakeTarget(int order, osg::Node* content) {
@@ -137,8 +153,7 @@ void Optics::AddField() {
   std::vector<Triangle> triangles;
   for (Index k = 0; k < kSides; ++k) {
     const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(k) / kSides;
-    positions.emplace_back(scope_.circle_radius * std::cos(angle) / scope_.picture_centre.x(),
-                           scope_.circle_radius * std::sin(angle) / scope_.picture_centre.y(), 0.0f);
+    positions.emplace_back(std::cos(angle), std::sin(angle), 0.0f);
     triangles.push_back({0, 1 + k, 1 + (k + 1) % kSides});
   }
   field.SetPositions(positions);
@@ -150,14 +165,16 @@ void Optics::AddField() {
 }
 
 void Optics::SetScale(float scale) {
-  const auto pixels = [scale](int full) {
-    return std::clamp(static_cast<int>(std::lround(scale * static_cast<float>(full))), 1, full);
+  if (scale == scale_) return;
+  scale_ = scale;
+  UseScale();
+}
+
+void Optics::UseScale() {
+  const auto pixels = [this](int full) {
+    return std::clamp(static_cast<int>(std::lround(scale_ * static_cast<float>(full))), 1, full);
   };
   const int width = pixels(width_), height = pixels(height_);
-  const osg::Viewport* now = scene_.camera->getViewport();
-  if (now != nullptr && static_cast<int>(now->width()) == width && static_cast<int>(now->height()) == height) {
-    return;
-  }
   background_.camera->setViewport(0, 0, width, height);
   scene_.camera->setViewport(0, 0, width, height);
   const osg::Vec2 share(static_cast<float>(width) / static_cast<float>(width_),

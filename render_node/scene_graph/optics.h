@@ -15,8 +15,11 @@ class Optics {
   /// Keeps both nodes. The textures have `width` x `height` pixels.
   Optics(const Laparoscope& scope, int width, int height, osg::Node* background, osg::Node* scene);
 
+  /// Replaces the textures by those of another size. `scope` is that of the new picture.
+  void SetSize(const Laparoscope& scope, int width, int height);
   /// Resolution of the scene as a share of width and height, in (0, 1].
   void SetScale(float scale);
+  /// Moves the camera; the size of the picture does not change.
   void SetScope(const Laparoscope& scope);
   /// 0: clear lens … 1: nothing to be seen (services/base/core/lens.h).
   void SetSoil(float soil) { soil_->set(soil); }
@@ -33,10 +36,12 @@ class Optics {
   Target MakeTarget(int order, osg::Node* content);
   void BackgroundChanged();
   void AddField();
+  void UseScale();
 
   Laparoscope scope_;
   int width_;
   int height_;
+  float scale_ = 1;
   osg::ref_ptr<osg::Group> node_;
   osg::ref_ptr<osg::Uniform> circle_radius_, picture_centre_, texture_scale_, texture_most_, soil_;
   Target background_, scene_;

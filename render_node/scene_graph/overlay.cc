@@ -16,30 +16,39 @@ constexpr int kGlyphUnit = 7;  // A texture unit that no other shader uses.
 
 }  // namespace
 
-Overlay::Overlay(int width, int height)
-    : width_(width), height_(height), dot_(std::max(1, height / 270)), mesh_("overlay", true) {
-  const GlyphSheet sheet = MakeGlyphSheet();
-  sheet_width_ = sheet.width;
-  osg::ref_ptr<osg::Texture2D> texture = MakeTexture(sheet.width, sheet.height, 1, sheet.dots, false);
-  texture->setFilter(osg::Texture::MIN_FILTER, osg::Texture::NEAREST);
-  texture->setFilter(osg::Texture::MAG_FILTER, osg::Texture::NEAREST);
+Overlay::Overlay(int width, int height) : mesh_("overlay", true) {
   mesh_.state()->setAttributeAndModes(MakeProgram("overlay.vert", "overlay.frag"));
-  mesh_.state()->setTextureAttribute(kGlyphUnit, texture);
   mesh_.state()->addUniform(new osg::Uniform("glyphs", kGlyphUnit));
   mesh_.state()->setMode(GL_DEPTH_TEST, osg::StateAttribute::OFF);
+  SetSize(width, height);
+}
+
+void Overlay::SetSize(int width, int height) {
+  width_ = width;
+  height_ = height;
+  const int dot = DotSize(height);
+  if (dot == dot_) return;
+  dot_ = dot;
+  const GlyphSheet sheet = MakeGlyphSheet(dot);
+  sheet_width_ = sheet.width;
+  osg::ref_ptr<osg::Texture2D> texture = MakeTexture(sheet.width, sheet.height, 1, sheet.pixels, false);
+  texture->setFilter(osg::Texture::MIN_FILTER, osg::Texture::NEAREST);
+  texture->setFilter(osg::Texture::MAG_FILTER, osg::Texture::NEAREST);
+  mesh_.state()->setTextureAttribute(kGlyphUnit, texture);
 }
 
 void Overlay::Set(std::span<const OverlayText> texts) {
   std::vector<Vec3f> positions;
   std::vector<std::array<float, 4>> coordinates, colours;
   std::vector<Triangle> triangles;
-  const int margin = 4 * dot_;
+  const int margin = 2 * dot_;
   for (const OverlayText& text : texts) {
     const bool top = text.corner == Corner::kTopLeft || text.corner == Corner::kTopRight;
     const bool left = text.corner == Corner::kTopLeft || text.corner == Corner::kBottomLeft;
     const int dot = text.size * dot_;
-    const int length = kGlyphWidth * dot * static_cast<int>(text.text.size());
-    const int pitch = (kGlyphHeight + 2) * dot;
+    const int glyph_width = kGlyphWidth * dot / 2, glyph_height = kGlyphHeight * dot / 2;
+    const int length = glyph_width * static_cast<int>(text.text.size());
+    const int pitch = glyph_height + dot;
     int x = left ? margin : width_ - margin - length;
     const int y = top ? height_ - margin - pitch * (text.line + 1) : margin + pitch * text.line;
     for (const char character : text.text) {
@@ -47,16 +56,17 @@ void Overlay::Set(std::span<const OverlayText> texts) {
       const int glyph = GlyphIndex(character);
       for (int corner = 0; corner < 4; ++corner) {
         const int dx = corner == 1 || corner == 2 ? 1 : 0, dy = corner >= 2 ? 1 : 0;
-        positions.emplace_back(2.0f * static_cast<float>(x + dx * kGlyphWidth * dot) / static_cast<float>(width_) - 1,
-                               2.0f * static_cast<float>(y + dy * kGlyphHeight * dot) / static_cast<float>(height_) - 1,
+        positions.emplace_back(2.0f * static_cast<float>(x + dx * glyph_width) / static_cast<float>(width_) - 1,
+                               2.0f * static_cast<float>(y + dy * glyph_height) / static_cast<float>(height_) - 1,
                                0.0f);
-        coordinates.push_back({static_cast<float>((glyph + dx) * kGlyphWidth) / static_cast<float>(sheet_width_),
-                               static_cast<float>(dy), 0, 0});
+        coordinates.push_back(
+            {static_cast<float>((glyph + dx) * kGlyphWidth * dot_ / 2) / static_cast<float>(sheet_width_),
+             static_cast<float>(dy), 0, 0});
         colours.push_back(text.warning ? kWarning : kText);
       }
       triangles.push_back({first, first + 1, first + 2});
       triangles.push_back({first, first + 2, first + 3});
-      x += kGlyphWidth * dot;
+      x += glyph_width;
     }
   }
   mesh_.SetPositions(positions);

@@ -20,7 +20,10 @@ struct OverlayText {
 
 class Overlay {
  public:
+  /// Size of the picture [pixels].
   Overlay(int width, int height);
+  /// The text changes its size with the next Set().
+  void SetSize(int width, int height);
   /// Replaces all text.
   void Set(std::span<const OverlayText> texts);
   [[nodiscard]] osg::Geometry* geometry() const { return mesh_.geometry(); }
@@ -29,8 +32,8 @@ class Overlay {
  private:
   int width_;
   int height_;
-  int dot_;  // Size of a dot of the font [pixels].
-  int sheet_width_;
+  int dot_ = 0;  // Size of a dot of the font [half pixels].
+  int sheet_width_ = 0;
   Mesh mesh_;
 };
 

@@ -84,9 +84,8 @@ void Surroundings::AddMask(const Laparoscope& scope) {
   std::vector<Triangle> triangles;
   for (Index k = 0; k < kRimSides; ++k) {
     const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(k) / kRimSides;
-    for (const float radius : {scope.circle_radius, 4 * scope.picture_centre.maxCoeff()}) {
-      positions.emplace_back(radius * std::cos(angle) / scope.picture_centre.x(),
-                             radius * std::sin(angle) / scope.picture_centre.y(), 0.0f);
+    for (const float radius : {1.0f, 4 * scope.picture_centre.maxCoeff() / scope.circle_radius}) {
+      positions.emplace_back(radius * std::cos(angle), radius * std::sin(angle), 0.0f);
     }
     const Index a = 2 * k, b = 2 * ((k + 1) % kRimSides);
     triangles.push_back({a, a + 1, b + 1});

@@ -5,4 +5,11 @@ in vec4 colour;
 uniform sampler2D glyphs;
 out vec4 fragment;
 
-void main() { fragment = vec4(colour.rgb, colour.a * texture(glyphs, place).r); }
+// The cell of a glyph darkens the picture, so that grey text is legible over pale tissue.
+const float cell = 0.5;
+
+void main() {
+  float glyph = texture(glyphs, place).r;
+  float cover = mix(cell, 1.0, glyph);
+  fragment = vec4(colour.rgb * glyph / cover, cover);
+}

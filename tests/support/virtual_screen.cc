@@ -25,14 +25,14 @@ bool Answers(int number) {
 
 }  // namespace
 
-VirtualScreen::VirtualScreen() {
+VirtualScreen::VirtualScreen(const std::string& size) {
   for (int attempt = 0; attempt < 5 && display_.empty() && installed_; ++attempt) {
     const int number = 100 + (::getpid() + 97 * attempt) % 800;
     child_ = ::fork();
     if (child_ == 0) {
-      const std::string name = ":" + std::to_string(number);
+      const std::string name = ":" + std::to_string(number), screen = size + "x24";
       if (std::freopen("/dev/null", "w", stderr) == nullptr) ::_exit(kNoProgram);
-      ::execlp("Xvfb", "Xvfb", name.c_str(), "-screen", "0", "1280x800x24", "-nolisten", "tcp", "-noreset", nullptr);
+      ::execlp("Xvfb", "Xvfb", name.c_str(), "-screen", "0", screen.c_str(), "-nolisten", "tcp", "-noreset", nullptr);
       ::_exit(kNoProgram);
     }
     Await(number);

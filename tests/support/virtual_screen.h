@@ -11,7 +11,8 @@ namespace fulcrum::testing {
 /// that do not see each other's locks may still meet on an abstract socket.
 class VirtualScreen {
  public:
-  VirtualScreen();
+  /// @param size of the screen [pixels], such as "1280x800".
+  explicit VirtualScreen(const std::string& size = "1280x800");
   ~VirtualScreen();
   VirtualScreen(const VirtualScreen&) = delete;
   VirtualScreen& operator=(const VirtualScreen&) = delete;

@@ -46,6 +46,11 @@ void XClient::Move(int x, int y) {
   XFlush(impl_->display);
 }
 
+void XClient::Resize(int width, int height) {
+  XMoveResizeWindow(impl_->display, impl_->window, 0, 0, static_cast<unsigned>(width), static_cast<unsigned>(height));
+  XSync(impl_->display, False);
+}
+
 std::vector<unsigned char> XClient::Pixels(int x, int y, int size) {
   XImage* const image = XGetImage(impl_->display, impl_->window, x, y, static_cast<unsigned>(size),
                                   static_cast<unsigned>(size), AllPlanes, ZPixmap);
@@ -54,6 +59,20 @@ std::vector<unsigned char> XClient::Pixels(int x, int y, int size) {
   std::vector<unsigned char> pixels(image->data, image->data + bytes);
   XDestroyImage(image);
   return pixels;
+}
+
+WindowPicture XClient::Whole() {
+  XWindowAttributes attributes;
+  if (XGetWindowAttributes(impl_->display, impl_->window, &attributes) == 0) return {};
+  WindowPicture picture{attributes.width, attributes.height, {}};
+  XImage* const image = XGetImage(impl_->display, impl_->window, 0, 0, static_cast<unsigned>(picture.width),
+                                  static_cast<unsigned>(picture.height), AllPlanes, ZPixmap);
+  if (image == nullptr) return {};
+  if (image->bits_per_pixel == 32) {
+    picture.bgrx.assign(image->data, image->data + static_cast<std::ptrdiff_t>(image->bytes_per_line) * picture.height);
+  }
+  XDestroyImage(image);
+  return picture;
 }
 
 void XClient::Press(const std::string& key, bool down) {

@@ -9,6 +9,12 @@
 
 namespace fulcrum::testing {
 
+/// Pixels of a window: blue, green, red and an unused byte each, row by row from the top.
+struct WindowPicture {
+  int width = 0, height = 0;
+  std::vector<unsigned char> bgrx;
+};
+
 class XClient final : public MouseAndKeyboard {
  public:
   /// Throws std::runtime_error if the display does not answer.
@@ -22,6 +28,11 @@ class XClient final : public MouseAndKeyboard {
   void Move(int x, int y) override;
   /// Pixels of a square of the window, which must be visible and contain it; in the format of the display.
   [[nodiscard]] std::vector<unsigned char> Pixels(int x, int y, int size);
+  /// Asks for another size of the window [pixels], as a user who drags its border, in the upper left corner of the
+  /// screen.
+  void Resize(int width, int height);
+  /// All of the window, which must be visible.
+  [[nodiscard]] WindowPicture Whole();
   void Press(const std::string& key, bool down) override;
 
  private:

@@ -157,7 +157,7 @@ TEST(QualityTest, StepsDownWhenPicturesAreDearAndUpWhenTheyAreCheap) {
 }
 
 TEST(QualityTest, NeverGoesBelowLegible) {
-  for (const int height : {180, 360, 540, 720}) {
+  for (const int height : {180, 360, 540, 720, 1080, 2160}) {
     QualityControl quality(Quality::kAuto, height);
     for (int k = 0; k < 1000; ++k) {
       quality.Add(500);
@@ -166,6 +166,26 @@ TEST(QualityTest, NeverGoesBelowLegible) {
     EXPECT_EQ(QualityControl(Quality::kLow, height).scale(), quality.scale());
     EXPECT_EQ(QualityControl(Quality::kHigh, height).scale(), 1.0f);
   }
+}
+
+TEST(QualityTest, ALargerPictureBeginsWithTheLinesOfTheLastAndASmallerOneWithAllOfIts) {
+  QualityControl quality(Quality::kAuto, 540);
+  for (int k = 0; k < 20; ++k) quality.Add(20);
+  ASSERT_EQ(quality.scale(), 1.0f);
+  quality.SetHeight(2160);
+  quality.Add(900);  // The first picture of a size also makes the textures.
+  EXPECT_LE(quality.scale() * 2160, 540);
+  EXPECT_GE(quality.scale() * 2160, 374);
+  quality.SetHeight(360);
+  quality.Add(900);
+  EXPECT_EQ(quality.scale(), 1.0f);
+  // A fast machine draws all lines within a hundred pictures, in several steps.
+  quality.SetHeight(2160);
+  for (int k = 0; k < 120; ++k) quality.Add(1 + 4 * quality.scale() * quality.scale());
+  EXPECT_EQ(quality.scale(), 1.0f);
+  QualityControl low(Quality::kLow, 540);
+  low.SetHeight(2160);
+  EXPECT_EQ(low.scale(), QualityControl(Quality::kLow, 2160).scale());
 }
 
 TEST(QualityTest, RefusesAnUnknownName) {

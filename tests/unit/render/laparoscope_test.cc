@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "render_node/geometry/camera_control.h"
+#include "render_node/geometry/glyphs.h"
 #include "render_node/geometry/solid.h"
 #include "render_node/geometry/tissue_pattern.h"
 
@@ -132,6 +133,47 @@ TEST(TissuePatternTest, IsTheSameInEveryRunAndNotFlat) {
                      static_cast<double>(vessels.size());
   EXPECT_GT(share, 0.01);
   EXPECT_LT(share, 0.6);
+}
+
+TEST(LaparoscopeTest, ThePictureKeepsItsShapeInAnyWindow) {
+  RenderParams params;
+  params.width = 960;
+  params.height = 540;
+  EXPECT_EQ(FitPicture(params, 960, 540), (PixelBox{0, 0, 960, 540}));
+  EXPECT_EQ(FitPicture(params, 1000, 1000), (PixelBox{0, 218, 1000, 563}));
+  EXPECT_EQ(FitPicture(params, 2000, 540), (PixelBox{520, 0, 960, 540}));
+  EXPECT_EQ(FitPicture(params, 20000, 20000).width, 7680) << "limited as a scene's";
+  for (int width = 1; width < 2000; width += 37) {
+    for (int height = 1; height < 2000; height += 41) {
+      const PixelBox box = FitPicture(params, width, height);
+      ASSERT_TRUE(box.x >= 0 && box.y >= 0 && box.width >= 1 && box.height >= 1);
+      ASSERT_TRUE(box.x + box.width <= width && box.y + box.height <= height) << width << " x " << height;
+      ASSERT_TRUE(box.width == width || box.height == height) << width << " x " << height;
+      ASSERT_NEAR(9.0 * box.width, 16.0 * box.height, 8.0 + 1e-9) << "half a pixel of the width or of the height";
+    }
+  }
+}
+
+TEST(GlyphTest, TextIsAShareOfThePictureAndNeverSmallerThanTenPixels) {
+  EXPECT_EQ(7 * DotSize(360) / 2, 10);
+  for (const int height : {540, 720, 1080, 2160}) {
+    EXPECT_GE(3.5 * DotSize(height), 0.0259 * height - 3.5);
+    EXPECT_LE(3.5 * DotSize(height), 0.026 * height);
+  }
+}
+
+TEST(GlyphTest, ADotOfOneAndAHalfPixelsHasTheLightOfItsArea) {
+  const GlyphSheet whole = MakeGlyphSheet(2), half = MakeGlyphSheet(3), large = MakeGlyphSheet(16);
+  const auto light = [](const GlyphSheet& sheet) {
+    double sum = 0;
+    for (const std::uint8_t pixel : sheet.pixels) sum += pixel;
+    return sum / 255;
+  };
+  EXPECT_EQ(half.width, whole.width * 3 / 2);
+  EXPECT_EQ(half.height, whole.height * 3 / 2);
+  EXPECT_EQ(large.height, 8 * whole.height);
+  EXPECT_NEAR(light(half), 2.25 * light(whole), 0.01 * light(half));
+  EXPECT_EQ(light(large), 64 * light(whole));
 }
 
 }  // namespace
