@@ -23,15 +23,15 @@ ExitCode RunRender(app::NodeApp& app) {
   settings.inputs = app.cart().inputs;
   auto stage = render::MakeStage(app.scene(), settings.window, spare);
   if (spare && !app::WaitUntilNeeded(NodeId::kRender)) return ExitCode::kDone;
-  // Collected before the ports are created: the threads that draw, this one and the rasteriser's, without those of the
-  // bus.
+  // Collected before the ports start the threads of the bus: those that draw, this one and the rasteriser's.
   const std::vector<int> drawing = render::ThreadsOfProcess();
   bus::Output<OperatorInput>* const operated = hands ? &app.MakeOutput<OperatorInput>() : nullptr;
-  const render::RenderPorts ports{
-      app.MakeInput<TissueFrame>(),    app.MakeInput<TopologyState>(),    app.MakeInput<TemperaturePatch>(),
-      app.MakeInput<ToolState>(),      app.MakeInput<HandleState>(),      app.MakeInput<ThermalEvent>(),
-      app.MakeInput<CauteryContact>(), app.MakeInput<GeneratorSetting>(), operated,
-      &app.MakeOutput<Picture>()};
+  const render::RenderPorts ports{app.MakeInput<TissueFrame>(),      app.MakeInput<TopologyState>(),
+                                  app.MakeInput<TemperaturePatch>(), app.MakeInput<ToolState>(),
+                                  app.MakeInput<HandleState>(),      app.MakeInput<ThermalEvent>(),
+                                  app.MakeInput<CauteryContact>(),   app.MakeInput<GeneratorSetting>(),
+                                  app.MakeInput<ContactModel>(),     operated,
+                                  &app.MakeOutput<Picture>()};
   render::LowerPriority(drawing);
   render::RenderNode node(app.scene(), settings, ports, std::move(stage));
   runtime::Log(runtime::LogLevel::kInfo, node.display_description());

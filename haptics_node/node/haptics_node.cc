@@ -115,11 +115,10 @@ void HapticsNode::Publish(const TickRecord& tick) {
 
 void HapticsNode::FillHealth(Health* health) const {
   const ServoFigures figures = figures_.Load();
-  const auto metric = [&](const char* name, double value) { health->metrics.push_back({name, value}); };
-  metric("peak_force_N", figures.peak_force_N);
-  for (std::size_t i = 0; i < devices_.size(); ++i) {
-    // The first two always: reports and pages show them.
-    if (i < 2 || devices_[i]) metric(("force" + std::to_string(i) + "_N").c_str(), figures.force_N[i]);
+  const auto metric = [&](const std::string& name, double value) { health->metrics.push_back({name, value}); };
+  metric("peak_hand_force_N", figures.peak_force_N);
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    if (devices_[i]) metric("hand_force" + std::to_string(i) + "_N", figures.force_N[i]);
   }
   metric("model_age_ms", 1e3 * figures.model_age_s);
   metric("models_dropped", static_cast<double>(figures.models_dropped));

@@ -32,9 +32,9 @@ struct ServoRecord {
 /// Figures for Health; trivially copyable, so that another thread can get a copy through a SeqLock.
 struct ServoFigures {
   ServoState state = ServoState::kOff;
-  double model_age_s = -1;  ///< Age of the model in use; negative if there is none.
-  double peak_force_N = 0;  ///< Largest force on a hand since the start.
-  std::array<double, kMaxTools> force_N{};
+  double model_age_s = -1;                  ///< Age of the model in use; negative if there is none.
+  double peak_force_N = 0;                  ///< Largest hand force since the start.
+  std::array<double, kMaxTools> force_N{};  ///< Hand force of each tool (idl/README.md, Forces).
   std::uint64_t models_dropped = 0;
   std::uint64_t not_finite = 0;
 };

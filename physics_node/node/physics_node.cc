@@ -6,6 +6,7 @@
 #include <string>
 
 #include "physics_node/node/physics_checkpoint.h"
+#include "services/base/core/contact_force.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -238,14 +239,14 @@ void PhysicsNode::PublishContacts(const Tick& tick) {
   // Without readers only where the solver provides the forces: otherwise slip needs those of the contact probe.
   if (scene_.physics.mode == PhysicsMode::kAccurate && !ports_.contacts.has_readers()) {
     for (std::uint32_t i = 0; i < kMaxTools; ++i) {
-      figures_.force_N[i].store(simulation_.solver_force(i).norm(), std::memory_order_relaxed);
+      NoteForce(i, static_cast<double>(simulation_.solver_force(i).norm()));
     }
     return;
   }
   ContactModel model;
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
     model.devices[i] = simulation_.Contacts(i);
-    figures_.force_N[i].store(simulation_.force(i).norm(), std::memory_order_relaxed);
+    NoteForce(i, TissueForce(model.devices[i]).norm());
   }
   // The servo dates the model by the tool sample, so there is no model without one.
   if (used_.tool_before.sequence == 0 || !ports_.contacts.has_readers()) {
@@ -256,6 +257,14 @@ void PhysicsNode::PublishContacts(const Tick& tick) {
   model.tool_stamp_ns = used_.pose_ns;
   model.physics_dt_s = scene_.physics.dt_s;
   ports_.contacts.Write(model);
+}
+
+void PhysicsNode::NoteForce(std::size_t tool, double force_N) {
+  figures_.force_N[tool].store(force_N, std::memory_order_relaxed);
+  // This thread alone writes it.
+  if (force_N > figures_.peak_force_N.load(std::memory_order_relaxed)) {
+    figures_.peak_force_N.store(force_N, std::memory_order_relaxed);
+  }
 }
 
 void PhysicsNode::PublishCautery(const Tick& tick) {
@@ -380,15 +389,15 @@ void PhysicsNode::PublishTears(const Tick& tick) {
 }
 
 void PhysicsNode::FillHealth(Health* health) const {
-  const auto add = [health](const char* name, double value) { health->metrics.push_back({name, value}); };
+  const auto add = [health](const std::string& name, double value) { health->metrics.push_back({name, value}); };
   add("displacement_mm", figures_.displacement_mm.load(std::memory_order_relaxed));
   add("max_displacement_mm", figures_.max_displacement_mm.load(std::memory_order_relaxed));
   add("grasped_particles", figures_.grasped.load(std::memory_order_relaxed));
   add("quarantined", static_cast<double>(figures_.quarantined.load(std::memory_order_relaxed)));
+  add("peak_force_N", figures_.peak_force_N.load(std::memory_order_relaxed));
   for (std::size_t i = 0; i < kMaxTools; ++i) {
-    // The first two always: reports show them.
-    if (i >= 2 && !TouchesTissue(scene_.tools[i].kind)) continue;
-    add(("tissue_force" + std::to_string(i) + "_N").c_str(), figures_.force_N[i].load(std::memory_order_relaxed));
+    if (!TouchesTissue(scene_.tools[i].kind)) continue;
+    add("force" + std::to_string(i) + "_N", figures_.force_N[i].load(std::memory_order_relaxed));
   }
   add("asleep_ticks", static_cast<double>(figures_.asleep_ticks.load(std::memory_order_relaxed)));
   add("topology_edits", static_cast<double>(figures_.topology_edits.load(std::memory_order_relaxed)));

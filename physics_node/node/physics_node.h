@@ -72,6 +72,7 @@ class PhysicsNode {
   void AdaptPreset(const Tick& tick);
   void PublishFrame(const Tick& tick);
   void PublishContacts(const Tick& tick);
+  void NoteForce(std::size_t tool, double force_N);
   void PublishCautery(const Tick& tick);
   void PublishManifest(const Tick& tick);
   void PublishTears(const Tick& tick);
@@ -145,7 +146,8 @@ class PhysicsNode {
   /// For the health thread. Relaxed order: the figures are independent of each other.
   struct Figures {
     std::atomic<std::uint32_t> cheaper{0};  ///< Presets below the scene's.
-    std::atomic<float> displacement_mm{0}, max_displacement_mm{0}, force_N[kMaxTools]{};
+    std::atomic<float> displacement_mm{0}, max_displacement_mm{0};
+    std::atomic<double> force_N[kMaxTools]{}, peak_force_N{0};  ///< Of the tissue on the tools.
     std::atomic<std::uint32_t> grasped{0};
     std::atomic<std::uint64_t> quarantined{0}, asleep_ticks{0}, topology_refused{0}, topology_edits{0};
     std::atomic<std::uint32_t> torn_edges{0};

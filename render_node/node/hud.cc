@@ -53,6 +53,11 @@ std::vector<std::string> PadHelp(const PadSettings& settings) {
 
 }  // namespace
 
+float ForceLimit(const SceneView& scene) {
+  constexpr float kLeast_N = 0.1f;  // Resolution of the figure; a scene may allow 0.
+  return std::max(kLeast_N, scene.assessment.limit[static_cast<std::size_t>(Measure::kPeakForce)]);
+}
+
 std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
   std::vector<OverlayText> texts;
   int line = 0;
@@ -113,7 +118,8 @@ std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
   line = 0;
   for (int tool = kMaxTools - 1; tool >= 0; --tool) {
     if (const auto& force_N = state.force_N[static_cast<std::size_t>(tool)]) {
-      texts.push_back({Corner::kBottomLeft, line++, ForceBar(tool, *force_N, state.force_limit_N)});
+      texts.push_back(
+          {Corner::kBottomLeft, line++, ForceBar(tool, *force_N, state.force_limit_N), *force_N > state.force_limit_N});
     }
   }
   const char* mode = (state.pedals & kPedalBlend)  ? "BLEND"

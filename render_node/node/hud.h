@@ -9,6 +9,7 @@
 #include "render_node/input/window_input.h"
 #include "render_node/scene_graph/overlay.h"
 #include "services/base/core/messages.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::render {
 
@@ -18,8 +19,8 @@ struct HudState {
   double session_time_s = 0;
   std::uint8_t pedals = kPedalNone;
   float power_W = 0;                                    ///< Set power of the generator.
-  std::array<std::optional<float>, kMaxTools> force_N;  ///< Force at each tool; no value without the tool.
-  float force_limit_N = 1;                              ///< Force that fills the bar.
+  std::array<std::optional<float>, kMaxTools> force_N;  ///< Force of the tissue on each tool; no value without it.
+  float force_limit_N = 1;                              ///< Force that fills the bar; above it the bar is a warning.
   std::optional<float> tip_C;  ///< Hottest texel of the newest patch; no value once the patch is old.
   float slit_m = 0;
   Alarm ureter = Alarm::kNone, nerve = Alarm::kNone;
@@ -30,6 +31,9 @@ struct HudState {
   std::optional<HandsState> hands;  ///< No value: the window operates nothing.
   PadSettings gamepad;              ///< For the help.
 };
+
+/// The highest force that the scene allows: the score's limit, also where nothing is scored [N].
+[[nodiscard]] float ForceLimit(const SceneView& scene);
 
 /// Texts to draw: figures, and warnings at twice their size. With `figures` false warnings only.
 [[nodiscard]] std::vector<OverlayText> HudTexts(const HudState& state, bool figures);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "render_node/geometry/laparoscope.h"
+#include "services/base/core/contact_force.h"
 #include "services/base/core/generator_inputs.h"
 #include "services/base/runtime/cyclic_thread.h"
 
@@ -27,8 +28,7 @@ constexpr double kTextLife_s = 4.0;  // Duration for which a temperature or a wa
 constexpr double kLate_s = 0.3;      // Timeout of topics with a rate of 100 Hz.
 
 bool LooksTheSame(const ToolSample& a, const ToolSample& b) {
-  return a.kind == b.kind && (a.p_WT - b.p_WT).norm() < kSamePlace && a.q_WT.angularDistance(b.q_WT) < kSameAngle &&
-         std::abs(a.f_W.norm() - b.f_W.norm()) < kSameForce;
+  return a.kind == b.kind && (a.p_WT - b.p_WT).norm() < kSamePlace && a.q_WT.angularDistance(b.q_WT) < kSameAngle;
 }
 
 }  // namespace
@@ -81,6 +81,7 @@ void RenderNode::Step(const Tick& tick) {
     TakeTools();
     TakeGenerator();
     TakeContact();
+    TakeForces();
     FindLate();
   }
   UpdateHands();
@@ -128,6 +129,7 @@ void RenderNode::PassOver() {
   (void)ports_.tools.TakeLatest(&new_tools_);
   (void)ports_.handles.TakeLatest(&new_handles_);
   (void)ports_.contacts.TakeLatest(&contact_);
+  (void)ports_.contact_models.TakeLatest(&contact_model_);
   while (ports_.patches.TakeNext(&patch_)) held_patches_[{patch_.header.origin_x, patch_.header.origin_y}] = patch_;
 }
 
@@ -185,12 +187,12 @@ bool RenderNode::Recent(double time_s) const { return session_time_s_ - time_s <
 void RenderNode::UpdateTexts() {
   hud_.session_time_s = session_time_s_;
   hud_.pedals = handles_.pedals;
-  hud_.force_limit_N = scene_.haptics.force_limit_N;
+  hud_.force_limit_N = ForceLimit(scene_);
   hud_.slit_m = topology_.cut_length_m;
   hud_.tip_C = Recent(temperature_time_s_) ? std::optional(temperature_C_) : std::nullopt;
   for (std::size_t k = 0; k < kMaxTools; ++k) {
     const bool there = TouchesTissue(tools_.tools[k].kind);
-    hud_.force_N[k] = there ? std::optional(tools_.tools[k].f_W.norm()) : std::nullopt;
+    hud_.force_N[k] = there ? std::optional(force_N_[k]) : std::nullopt;
   }
   const auto alarm = [this](std::size_t k) {
     return injured_[k] ? Alarm::kInjured : Recent(warned_s_[k]) ? Alarm::kHot : Alarm::kNone;
@@ -230,6 +232,16 @@ void RenderNode::TakeContact() {
   // Events report the first steam at a place only; steam continues while power is delivered to boiling tissue.
   if (contact_.touching && hud_.power_W > 0 && temperature_C_ > kBoils_C && Recent(temperature_time_s_)) {
     view_.AddSmoke(contact_.material, session_time_s_);
+    changed_on_screen_ = changed_in_file_ = true;
+  }
+}
+
+void RenderNode::TakeForces() {
+  if (!ports_.contact_models.TakeLatest(&contact_model_)) return;
+  for (std::size_t k = 0; k < kMaxTools; ++k) {
+    const auto force_N = static_cast<float>(TissueForce(contact_model_.devices[k]).norm());
+    if (std::abs(force_N - force_N_[k]) < kSameForce) continue;
+    force_N_[k] = force_N;
     changed_on_screen_ = changed_in_file_ = true;
   }
 }

@@ -33,6 +33,7 @@ struct RenderPorts {
   bus::Input<ThermalEvent>& events;
   bus::Input<CauteryContact>& contacts;
   bus::Input<GeneratorSetting>& generator;
+  bus::Input<ContactModel>& contact_models;      ///< For the force of the tissue on the tools.
   bus::Output<OperatorInput>* operator_input;    ///< Null: the window operates nothing.
   bus::LoanOutput<Picture>* pictures = nullptr;  ///< Null: no live pictures.
 };
@@ -93,6 +94,7 @@ class RenderNode {
   void TakeEvents();
   void TakeGenerator();
   void TakeContact();
+  void TakeForces();
   void TakeKeys();
   /// Follows the size of the window.
   void TakeSize();
@@ -129,6 +131,8 @@ class RenderNode {
   HandleState handles_, new_handles_;
   ThermalEvent event_;
   CauteryContact contact_;
+  ContactModel contact_model_;
+  std::array<float, kMaxTools> force_N_{};  // Of the tissue on the tools.
   GeneratorSetting generator_;
   Bitmap picture_;
   HudState hud_;

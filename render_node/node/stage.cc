@@ -25,7 +25,7 @@ void WarmUp(const SceneView& scene, Stage* stage) {
     view.SetTool(k, shown);
   }
   HudState hud;
-  hud.force_limit_N = scene.haptics.force_limit_N;
+  hud.force_limit_N = ForceLimit(scene);
   view.SetTexts(HudTexts(hud, scene.render.hud != 0));
   view.AddSmoke(Vec2f::Zero(), -10);
   static_cast<void>(view.UpdateEffects(-9.9));

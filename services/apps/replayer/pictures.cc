@@ -54,13 +54,14 @@ PicturesResult ReplayPictures(const PicturesSettings& settings, const SceneView&
   Feed<ThermalEvent> events;
   Feed<CauteryContact> contacts;
   Feed<GeneratorSetting> generator;
+  Feed<ContactModel> contact_models;
   render::RenderSettings render_settings;
   // Quality auto depends on the speed of the machine, so that pictures would differ between runs.
   render_settings.quality = render::Quality::kHigh;
   render_settings.frames = settings.frames;
   render::RenderNode node(scene, render_settings,
                           {tissue.input(), topology.input(), patches.input(), tools.input(), handles.input(),
-                           events.input(), contacts.input(), generator.input(), nullptr});
+                           events.input(), contacts.input(), generator.input(), contact_models.input(), nullptr});
 
   std::optional<SceneManifest> session;
   const double period_s = 1.0 / std::max(0.001f, scene.render.rate_Hz);
@@ -80,7 +81,8 @@ PicturesResult ReplayPictures(const PicturesSettings& settings, const SceneView&
                        patches.Take(topic, message.data, &newest_ns) || tools.Take(topic, message.data, &newest_ns) ||
                        handles.Take(topic, message.data, &newest_ns) || events.Take(topic, message.data, &newest_ns) ||
                        contacts.Take(topic, message.data, &newest_ns) ||
-                       generator.Take(topic, message.data, &newest_ns);
+                       generator.Take(topic, message.data, &newest_ns) ||
+                       contact_models.Take(topic, message.data, &newest_ns);
     if (!known || !session) continue;
     const double time_s = 1e-9 * static_cast<double>(newest_ns - session->session_start_ns);
     if (settings.until_s >= 0 && time_s > settings.until_s) break;

@@ -8,6 +8,7 @@
 #include "services/apps/replayer/coupled_nodes.h"
 #include "services/apps/replayer/session_facts.h"
 #include "services/apps/replayer/tick_source.h"
+#include "services/base/core/contact_force.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/cyclic_thread.h"
 
@@ -27,10 +28,7 @@ struct Spread {
 
 std::array<Vec3f, kMaxTools> TissueForces(const ContactModel& model) {
   std::array<Vec3f, kMaxTools> forces;
-  for (std::size_t i = 0; i < forces.size(); ++i) {
-    forces[i].setZero();
-    for (std::uint32_t c = 0; c < model.devices[i].count; ++c) forces[i] += model.devices[i].contacts[c].f_ref;
-  }
+  for (std::size_t i = 0; i < forces.size(); ++i) forces[i] = TissueForce(model.devices[i]).cast<float>();
   return forces;
 }
 

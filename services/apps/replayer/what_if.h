@@ -30,7 +30,7 @@ struct WhatIfResult {
   double max_position_s = 0;  ///< Session time of the largest distance [s].
   Pair peak_tissue_force_N;   ///< Force of the tissue on a tool, from the contacts.
   double rms_tissue_force_N = 0;
-  Pair peak_hand_force_N;  ///< Force sent to the hand; only when haptics is replayed.
+  Pair peak_hand_force_N;  ///< Hand force at the tip; only when haptics is replayed.
   double rms_hand_force_N = 0;
   Pair cut_length_mm;  ///< Only when thermal is replayed.
   Pair highest_temperature_C;

@@ -22,8 +22,8 @@ std::string ReportText(const WhatIfResult& result, const std::vector<NodeId>& no
     text = Format("first difference: %s at %.3f s\n", NodeName(result.first_node), result.first_difference_s);
   }
   text += Format("%-28s %12s %12s %12s\n", "", "before", "after", "change");
-  if (has(NodeId::kPhysics)) text += PairLine("peak force of the tissue [N]", result.peak_tissue_force_N);
-  if (has(NodeId::kHaptics)) text += PairLine("peak force to the hand [N]", result.peak_hand_force_N);
+  if (has(NodeId::kPhysics)) text += PairLine("peak force [N]", result.peak_tissue_force_N);
+  if (has(NodeId::kHaptics)) text += PairLine("peak hand force at the tip [N]", result.peak_hand_force_N);
   if (has(NodeId::kThermal)) {
     text += PairLine("cut length [mm]", result.cut_length_mm);
     text += PairLine("highest temperature [C]", result.highest_temperature_C);
@@ -32,9 +32,9 @@ std::string ReportText(const WhatIfResult& result, const std::vector<NodeId>& no
   if (has(NodeId::kPhysics)) {
     text += Format("positions apart: rms %.4g mm, at most %.4g mm (at %.2f s)\n", result.rms_position_mm,
                    result.max_position_mm, result.max_position_s);
-    text += Format("forces of the tissue apart: rms %.4g N\n", result.rms_tissue_force_N);
+    text += Format("forces apart: rms %.4g N\n", result.rms_tissue_force_N);
   }
-  if (has(NodeId::kHaptics)) text += Format("forces to the hand apart: rms %.4g N\n", result.rms_hand_force_N);
+  if (has(NodeId::kHaptics)) text += Format("hand forces at the tip apart: rms %.4g N\n", result.rms_hand_force_N);
   if (!result.missing.empty()) text += "ended early: " + result.missing + '\n';
   return text + Format("%llu ticks, %.2f s of the session, twice in %.2f s\n",
                        static_cast<unsigned long long>(result.ticks), result.session_s, result.wall_s);

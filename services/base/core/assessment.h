@@ -78,7 +78,7 @@ inline constexpr std::array<MeasureInfo, kMeasureCount> kMeasures{{
     {"idle", "idle_s", "idle time", "s", 1, MeasureRole::kSkill, false, true, 20, 0, 86400, 5},
     {"smoothness", "smoothness", "smoothness (SPARC)", "", 2, MeasureRole::kSkill, true, true, -3, -50, -1, 5},
     {"force_time", "force_time_Ns", "force · time", "N s", 1, MeasureRole::kSkill, false, true, 300, 0, 1e6f, 5},
-    {"peak_force", "peak_force_N", "peak force on tissue", "N", 2, MeasureRole::kSkill, false, true, 11.4f, 0, 100, 15},
+    {"peak_force", "peak_force_N", "peak force", "N", 2, MeasureRole::kSkill, false, true, 11.4f, 0, 100, 15},
     {"grasp_slips", "grasp_slips", "grasp slips", "", 0, MeasureRole::kSkill, false, true, 0, 0, 1000, 5},
     {"pedal_without_contact", "pedal_without_contact_s", "pedal time without contact", "s", 1, MeasureRole::kSkill,
      false, false, 2, 0, 3600, 5},

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "services/base/core/contact_force.h"
 #include "services/session/assessment/gap.h"
 
 namespace fulcrum::assessment {
@@ -18,17 +19,6 @@ const Contact* GraspOf(const DeviceContacts& contacts) {
   const auto* grasp = std::find_if(contacts.contacts.begin(), end,
                                    [](const Contact& contact) { return contact.kind == ContactKind::kGrasp; });
   return grasp == end ? nullptr : grasp;
-}
-
-double ForceOf(const DeviceContacts& contacts) {
-  Vec3d force = Vec3d::Zero();
-  for (std::uint32_t i = 0; i < std::min<std::uint32_t>(contacts.count, kMaxContacts); ++i) {
-    const Contact& contact = contacts.contacts[i];
-    const bool touches =
-        contact.kind == ContactKind::kGrasp || (contact.kind == ContactKind::kSurface && contact.gap <= 0);
-    if (touches) force += contact.f_ref.cast<double>();
-  }
-  return force.norm();
 }
 
 }  // namespace
@@ -48,7 +38,7 @@ ForceMeter::Finding ForceMeter::Add(double time_s, const ContactModel& model) {
   last_s_ = time_s;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     ToolForce& tool = tools_[i];
-    const double force_N = ForceOf(model.devices[i]);
+    const double force_N = TissueForce(model.devices[i]).norm();
     tool.force_time_Ns += 0.5 * dt_s * (tool.force_N + force_N);
     tool.force_N = force_N;
     tool.peak_N = std::max(tool.peak_N, force_N);

@@ -1,5 +1,6 @@
 #include "services/session/console/live_state.h"
 
+#include <algorithm>
 #include <string_view>
 
 #include "services/session/console/advice.h"
@@ -56,7 +57,7 @@ std::string NodeJson(const NodeReport& report, std::int64_t now_ns) {
 
 std::string FiguresJson(const SessionWatch& watch) {
   Json json('{');
-  const auto add = [&](const char* key, NodeId node, const char* metric, double step) {
+  const auto add = [&](std::string_view key, NodeId node, std::string_view metric, double step) {
     json.Number(key, supervisor::MetricOf(watch.health(node), metric), step);
   };
   if (watch.expects(NodeId::kThermal)) {
@@ -68,9 +69,13 @@ std::string FiguresJson(const SessionWatch& watch) {
     add("set_coag_W", NodeId::kSupervisor, "generator_coag_W", 0.1);
     add("set_blend_W", NodeId::kSupervisor, "generator_blend_W", 0.1);
   }
-  add("force0_N", NodeId::kHaptics, "force0_N", 0.01);
-  add("force1_N", NodeId::kHaptics, "force1_N", 0.01);
-  add("peak_N", NodeId::kHaptics, "peak_force_N", 0.01);
+  double hand_N = 0;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    add(ForceMetric(i), NodeId::kPhysics, ForceMetric(i), 0.01);
+    hand_N = std::max(hand_N, supervisor::MetricOf(watch.health(NodeId::kHaptics), "hand_" + ForceMetric(i)));
+  }
+  add("peak_force_N", NodeId::kPhysics, "peak_force_N", 0.01);
+  json.Number("hand_force_N", hand_N, 0.01);
   add("operated_tools", NodeId::kHaptics, "operated_tools", 1);
   return json.Done();
 }

@@ -54,17 +54,16 @@ void SessionWatch::TakePoint(std::int64_t now_ns) {
   seen_->next_point_ns = now_ns + kPointPeriod_ns;
   const double time_s = 1e-9 * static_cast<double>(now_ns - manifest().session_start_ns);
   const Health& thermal = health(NodeId::kThermal);
-  const Health& haptics = health(NodeId::kHaptics);
+  const Health& physics = health(NodeId::kPhysics);
   const auto fresh = [now_ns](const Health& h) {
     return h.pid != 0 && now_ns - h.stamp.stamp_ns < supervisor::kSilence_ns;
   };
-  if (time_s < 0 || (!fresh(thermal) && !fresh(haptics))) return;
+  if (time_s < 0 || (!fresh(thermal) && !fresh(physics))) return;
   PlotPoint point;
   point.number = ++last_number_;
   point.time_s = time_s;
   point.temperature_C = supervisor::MetricOf(thermal, "temperature_C");
-  point.force_N[0] = supervisor::MetricOf(haptics, "force0_N");
-  point.force_N[1] = supervisor::MetricOf(haptics, "force1_N");
+  for (std::size_t i = 0; i < kMaxTools; ++i) point.force_N[i] = supervisor::MetricOf(physics, ForceMetric(i));
   points_.push_back(point);
   while (points_.front().time_s < time_s - kPlotSpan_s) points_.pop_front();
 }

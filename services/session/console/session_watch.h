@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "services/base/core/messages.h"
 #include "services/session/supervisor/session_view.h"
@@ -18,8 +19,11 @@ struct PlotPoint {
   std::uint64_t number = 0;  ///< Grows over all sessions.
   double time_s = 0;         ///< Session time [s].
   double temperature_C = 0;
-  double force_N[kMaxTools] = {0, 0};
+  double force_N[kMaxTools] = {};  ///< Of the tissue on the tools.
 };
+
+/// Name of the figure of physics_node's Health that holds the force of the tissue on a tool.
+[[nodiscard]] inline std::string ForceMetric(std::size_t tool) { return "force" + std::to_string(tool) + "_N"; }
 
 class SessionWatch {
  public:

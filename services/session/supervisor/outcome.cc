@@ -38,7 +38,8 @@ std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
     int decimals;
     bool at_end = false;  ///< The last value instead of the highest: a slit that is still short has larger deviations.
   };
-  constexpr std::array kSources{Source{kHaptics, "peak_force_N", "peak force", "N", 2},
+  constexpr std::array kSources{Source{kPhysics, "peak_force_N", "peak force", "N", 2},
+                                Source{kHaptics, "peak_hand_force_N", "peak hand force", "N", 2},
                                 Source{kThermal, "highest_temperature_C", "highest temperature", "°C", 0},
                                 Source{kThermal, "cut_length_mm", "cut length", "mm", 1},
                                 Source{kThermal, "cut_width_p50_mm", "width of the slit, median", "mm", 2, true},

@@ -132,14 +132,25 @@ std::string Plots(const SessionOutcome& outcome, const SessionRecord& record) {
       html += "<div class='card'>" + plot + "</div>\n";
     }
   };
-  const auto line = [&](const char* label, const char* colour, const char* metric) {
+  const auto line = [&](const std::string& label, const char* colour, const std::string& metric) {
     return PlotLine{label, colour, &record.curve(metric)};
   };
-  add("Force on the hand", "N", {line("tool 0", "#1f6feb", "force0_N"), line("tool 1", "#bc4c00", "force1_N")});
+  const auto lines_of = [&](const char* force) {
+    constexpr std::array kColours{"#1f6feb", "#bc4c00", "#8250df", "#1a7f37"};
+    std::vector<PlotLine> lines;
+    for (std::size_t i = 0; i < kMaxTools; ++i) {
+      const std::string tool = std::to_string(i);
+      PlotLine of_tool = line("tool " + tool, kColours[i % kColours.size()], force + tool + "_N");
+      if (!of_tool.curve->points().empty()) lines.push_back(std::move(of_tool));
+    }
+    return lines;
+  };
+  add("Force (of the tissue on the tool)", "N", lines_of("force"));
   add("Hottest spot", "°C", {line("temperature", "#cf222e", "temperature_C")});
   add("Cut length", "mm", {line("cut", "#8250df", "cut_length_mm")});
   add("Power of the generator", "W", {line("set", "#57606a", "set_power_W"), line("delivered", "#bc4c00", "power_W")});
   add("Displacement of the tissue", "mm", {line("displacement", "#1a7f37", "displacement_mm")});
+  add("Hand force (sent to the device)", "N", lines_of("hand_force"));
   if (html.empty()) {
     return {};
   }

@@ -1,6 +1,7 @@
 #include "services/session/supervisor/session_status.h"
 
 #include <algorithm>
+#include <string>
 
 #include "services/session/supervisor/outcome.h"
 #include "services/session/supervisor/script_outlook.h"
@@ -17,9 +18,10 @@ std::string FiguresLine(const std::string& phase, const SessionRecord& record, d
   std::string line = "t " + Fixed(std::max(0.0, session_time_s), 1);
   line += (end_s > 0 ? " / " + Fixed(end_s, 1) : std::string()) + " s";
   line += phase.empty() ? "" : " · " + phase;
-  line += " · force " + Fixed(std::max(last("force0_N"), last("force1_N")), 2) + " N · displaced " +
-          Fixed(last("displacement_mm"), 1) + " mm · " + Fixed(last("temperature_C"), 0) + " °C · cut " +
-          Fixed(last("cut_length_mm"), 1) + " mm";
+  double force_N = 0;
+  for (int i = 0; i < kMaxTools; ++i) force_N = std::max(force_N, record.last("force" + std::to_string(i) + "_N"));
+  line += " · force " + Fixed(force_N, 2) + " N · displaced " + Fixed(last("displacement_mm"), 1) + " mm · " +
+          Fixed(last("temperature_C"), 0) + " °C · cut " + Fixed(last("cut_length_mm"), 1) + " mm";
   return line;
 }
 

@@ -64,7 +64,7 @@ inline constexpr std::array kRoles{
                kNodeReads | SetOf(kCauteryContact, kTearState, kHandleState, kGeneratorSetting)},
     AccessRole{"render_node", kNodeWrites | SetOf(kOperatorInput, kPicture),
                kNodeReads | SetOf(kTissueFrame, kTopologyState, kTemperaturePatch, kToolState, kHandleState,
-                                  kThermalEvent, kCauteryContact, kGeneratorSetting)},
+                                  kThermalEvent, kCauteryContact, kGeneratorSetting, kContactModel)},
     AccessRole{"recorder", kNodeWrites, kAll},
     AccessRole{kReplayerIdentity, kAll, 0},
     AccessRole{kLinkIdentity, kAll, kAll},

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <turbojpeg.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -103,6 +104,45 @@ TEST_F(RenderNodeTest, WritesAPictureWhenOneIsDueAndNoneWhileNothingChanges) {
   }
   EXPECT_TRUE(std::filesystem::exists(folder_ / "frame_0001000.png"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "frame_0001510.png"));
+}
+
+TEST(HudTest, TheBarIsFullAtTheHighestForceAllowedAndAWarningAbove) {
+  HudState state;
+  state.force_limit_N = 4;
+  state.force_N[0] = 4.0f;
+  state.force_N[1] = 7.66f;
+  const std::vector<OverlayText> texts = HudTexts(state, true);
+  const auto bar = [&](const std::string& text) {
+    return std::find_if(texts.begin(), texts.end(), [&](const OverlayText& t) { return t.text == text; });
+  };
+  ASSERT_NE(bar("L ########## 4.0 N"), texts.end());
+  EXPECT_FALSE(bar("L ########## 4.0 N")->warning);
+  ASSERT_NE(bar("R ########## 7.7 N"), texts.end());
+  EXPECT_TRUE(bar("R ########## 7.7 N")->warning);
+}
+
+TEST_F(RenderNodeTest, ShowsTheForceOfTheTissueAndNotThatOnTheHand) {
+  const auto node = MakeNode();
+  const auto reader = bus_.pictures.MakeInput();
+  SyntheticMoment moment = MakeSyntheticMoment(view_, 1.0);
+  Publish(moment);
+  node->Step(At(1.0));
+  node->Step(At(1.02));  // Smoke and blood of the first moment have come to rest.
+  const double drawn = Metric(*node, "frames_drawn");
+  ASSERT_GE(drawn, 1);
+  moment.tools.tools[0].f_W = Vec3f(0, 0, 1);
+  Stamped(&moment.tools.stamp);
+  bus_.tools_out->Write(moment.tools);
+  node->Step(At(1.05));
+  EXPECT_EQ(Metric(*node, "frames_drawn"), drawn);
+  ContactModel model;
+  Stamped(&model.stamp);
+  model.devices[0].count = 1;
+  model.devices[0].contacts[0].kind = ContactKind::kGrasp;
+  model.devices[0].contacts[0].f_ref = Vec3f(0, 0, 5);
+  bus_.contact_models_out->Write(model);
+  node->Step(At(1.1));
+  EXPECT_EQ(Metric(*node, "frames_drawn"), drawn + 1) << "the figure has changed";
 }
 
 TEST_F(RenderNodeTest, SendsEachChangeWhilePicturesAreReadAndNoneOtherwise) {

@@ -79,7 +79,7 @@ TEST_F(TestNodeTest, AssertionsAreJudgedOverTheFiguresOfHealth) {
   EXPECT_EQ(bad.code, 1) << bad.said;
   EXPECT_NE(fulcrum::testing::ReadFile(JUnit()).find("tests=\"3\" failures=\"1\" errors=\"0\""), std::string::npos)
       << fulcrum::testing::ReadFile(JUnit());
-  const Answer felt = Test("haptics", {"--assert", "peak_force_N <= 3.3", "--assert", "peak_force_N > 0"});
+  const Answer felt = Test("haptics", {"--assert", "peak_hand_force_N <= 3.3", "--assert", "peak_hand_force_N > 0"});
   EXPECT_EQ(felt.code, 0) << felt.said;
 }
 

@@ -197,7 +197,7 @@ TEST_F(Faults, TheHandIsNeverHurt) {
   EXPECT_EQ(judge_->verdict(), "") << "a broken physics published";
 
   WatchFor(0.3);  // Health comes ten times a second.
-  EXPECT_LE(Metric("peak_force_N"), 3.3);
+  EXPECT_LE(Metric("peak_hand_force_N"), 3.3);
   EXPECT_GT(Metric("models_dropped"), 10);
   EXPECT_EQ(Metric("forces_not_finite"), 0);
   const auto input = std::find_if(health_.inputs.begin(), health_.inputs.end(),

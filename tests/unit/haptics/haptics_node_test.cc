@@ -131,9 +131,9 @@ TEST_F(HapticsNodeTest, HealthTellsForcesAndThatPhysicsIsGone) {
   health.state = HealthState::kRunning;
   node->FillHealth(&health);
   EXPECT_EQ(health.state, HealthState::kRunning);
-  EXPECT_GT(metric(health, "peak_force_N"), 0.1);
-  EXPECT_GT(metric(health, "force0_N"), 0.1);
-  EXPECT_EQ(metric(health, "force1_N"), 0.0);
+  EXPECT_GT(metric(health, "peak_hand_force_N"), 0.1);
+  EXPECT_GT(metric(health, "hand_force0_N"), 0.1);
+  EXPECT_EQ(metric(health, "hand_force1_N"), -1.0) << "no device, no figure";
   EXPECT_NEAR(metric(health, "model_age_ms"), 15, 10);
   EXPECT_LE(health.metrics.size(), 16u);
 
@@ -144,8 +144,8 @@ TEST_F(HapticsNodeTest, HealthTellsForcesAndThatPhysicsIsGone) {
   node->FillHealth(&later);
   EXPECT_EQ(later.state, HealthState::kDegraded);
   EXPECT_NE(later.last_error.find("contact model"), std::string::npos);
-  EXPECT_EQ(metric(later, "force0_N"), 0.0);
-  EXPECT_GE(metric(later, "peak_force_N"), metric(health, "peak_force_N"));
+  EXPECT_EQ(metric(later, "hand_force0_N"), 0.0);
+  EXPECT_GE(metric(later, "peak_hand_force_N"), metric(health, "peak_hand_force_N"));
 }
 
 TEST_F(HapticsNodeTest, WhatDoesNotPassTheGateIsCounted) {

@@ -38,7 +38,7 @@ TEST(ScoreSheetTest, SaysValueThresholdAndPointsEverywhere) {
   EXPECT_EQ(sheet.score.of, 35);
   EXPECT_NEAR(sheet.score.points, 27.5, 1e-4);
   const std::string table = SheetTable(sheet);
-  EXPECT_NE(table.find("peak force on tissue [N]"), std::string::npos) << table;
+  EXPECT_NE(table.find("peak force [N]"), std::string::npos) << table;
   EXPECT_NE(table.find("≤ 11.40 ✗"), std::string::npos) << table;
   EXPECT_NE(table.find("score 79 % (27.5 of 35 points)"), std::string::npos) << table;
   const std::string json = SheetJson(sheet, {"line", "s-1", "Ann \"A\"", ""});
@@ -51,7 +51,7 @@ TEST(ScoreSheetTest, SaysValueThresholdAndPointsEverywhere) {
   EXPECT_EQ(json.find("nan"), std::string::npos);
   const std::string html = SheetHtml(sheet, "Ann <b>");
   EXPECT_NE(html.find("Ann &lt;b&gt;"), std::string::npos);
-  EXPECT_NE(html.find("<tr class='bad'><td class='text'>peak force on tissue [N]</td>"), std::string::npos) << html;
+  EXPECT_NE(html.find("<tr class='bad'><td class='text'>peak force [N]</td>"), std::string::npos) << html;
 }
 
 class TrainingLogTest : public testing::Test {

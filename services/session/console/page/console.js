@@ -237,8 +237,9 @@ function showFigures(figures) {
   const heat = figures.temperature_C !== undefined;  // Scenes without heat have no temperature.
   setText($('temperature'), heat ? `${figures.temperature_C.toFixed(0)} °C` : '–');
   setText($('temperature-more'), heat ? `${figures.power_W.toFixed(0)} W · cut ${figures.cut_mm.toFixed(1)} mm` : 'no heat in this scene');
-  setText($('force'), `${Math.max(figures.force0_N, figures.force1_N).toFixed(2)} N`);
-  setText($('force-more'), `highest ${figures.peak_N.toFixed(2)} N`);
+  const forces = Object.keys(figures).filter(key => /^force\d_N$/.test(key)).map(key => figures[key]);
+  setText($('force'), `${Math.max(0, ...forces).toFixed(2)} N`);
+  setText($('force-more'), `highest ${figures.peak_force_N.toFixed(2)} N · at the hand ${figures.hand_force_N.toFixed(2)} N`);
   drawPlot($('plot-temperature'), points, {span: kSpan, floor: 20, least: 60, unit: '°C', lines: heat ? [{at: 1, colour: '#ff8a5c'}] : []});
   drawPlot($('plot-force'), points, {span: kSpan, floor: 0, least: 0.5, unit: 'N',
     lines: [{at: 2, colour: '#58bcff'}, {at: 3, colour: '#ffd866'}]});
