@@ -46,6 +46,9 @@ class LinkMonitor {
   /// on a machine with fourfold load.
   static constexpr double kSilence_s = 0.2;
 
+  /// Silence that one tick can add, however late it is.
+  static constexpr double kMostPerTick_s = 0.05;
+
   /// Adds one tick's counts; `dt_s` is the time since the last call.
   void Add(const LinkCounts& counts, double dt_s);
   void Reset() { *this = LinkMonitor(); }

@@ -247,6 +247,21 @@ TEST(LinkMonitor, StallOfTheProgramClearsTheWindow) {
   EXPECT_EQ(monitor.state(), LinkState::kOk);
 }
 
+TEST(LinkMonitor, AStallIsNoSilenceOfTheLineUntilTheLineStaysSilent) {
+  for (const double stall_s : {0.15, 0.3, 5.0}) {
+    LinkMonitor monitor;
+    Feed(&monitor, 400, kGoodLine);
+    Feed(&monitor, 8, {});  // A pedal sends each 20 ms.
+    monitor.Add({}, stall_s);
+    EXPECT_EQ(monitor.state(), LinkState::kOk) << stall_s;
+    LinkMonitor alive = monitor;
+    Feed(&alive, 8, kGoodLine);
+    EXPECT_EQ(alive.state(), LinkState::kOk) << stall_s;
+    Feed(&monitor, 80, {});
+    EXPECT_EQ(monitor.state(), LinkState::kNoData) << stall_s;
+  }
+}
+
 std::string FrameLine(const Frame& frame) {
   const auto line = FormatFrame(frame);
   return {line.data(), line.size() - 2};
