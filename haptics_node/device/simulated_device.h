@@ -28,8 +28,8 @@ class SimulatedDevice final : public HapticDevice {
   /// The hand plays a recorded motion of the attach point, transformed to the world by `map`.
   SimulatedDevice(const HandModel& hand, std::shared_ptr<const RecordedMotion> motion, const WorkspaceMap& map);
 
-  /// The hand of an assistant: while the script's jaw is closed it pulls against the tissue until the force at the tip
-  /// is this [N], wherever the tissue goes. 0: it follows the script alone.
+  /// The hand of an assistant: while the script's jaw is closed it pulls against the tissue until the hand force at
+  /// the tip is this [N], wherever the tissue goes. 0: it follows the script alone.
   void set_traction(double traction_N) { traction_N_ = traction_N; }
   /// The script stands still from this session time on [s].
   void set_script_end(double session_time_s) { script_end_s_ = session_time_s; }

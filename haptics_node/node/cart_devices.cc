@@ -67,7 +67,7 @@ std::unique_ptr<SimulatedDevice> MakeSimulated(const DeviceConfig& device, const
         hand, std::make_shared<const RecordedMotion>(RecordedMotion::Load(device.motion)), map);
   }
   made->set_force_scale(device.force_scale);
-  made->set_traction(static_cast<double>(scene.tools[tool].traction_N));
+  made->set_traction(static_cast<double>(scene.haptics.force_scale * scene.tools[tool].traction_N));
   made->set_rest(RestOf(scene, tool, trocar));
   return made;
 }

@@ -183,8 +183,8 @@ struct ToolDescription {
   float shaft_length_m = 0;
   float tip_radius_m = 0;  ///< Radius of the capsule that touches tissue.
   float tip_length_m = 0;  ///< Length of the jaws, or of the hook's foot.
-  /// An assistant: no person operates this tool, and its scripted hand keeps this force at the tip while its jaws are
-  /// closed [N]. 0: none.
+  /// An assistant: no person operates this tool, and its scripted hand keeps this force of the tissue while its jaws
+  /// are closed [N]. 0: none.
   float traction_N = 0;
 };
 

@@ -212,7 +212,7 @@ void ReadTool(StrictMap map, const Folders& folders, const RenderParams& render,
   ReadSi(&map, "shaft_length_mm", Range::Between(50, 1000), &tool->shaft_length_m);
   ReadSi(&map, "tip_radius_mm", Range::Between(0.05, 20), &tool->tip_radius_m);
   ReadSi(&map, "tip_length_mm", Range::Between(0.1, 100), &tool->tip_length_m);
-  if (tool->kind == ToolKind::kGrasper) ReadSi(&map, "traction_N", Range::Between(0, 3), &tool->traction_N);
+  if (tool->kind == ToolKind::kGrasper) ReadSi(&map, "traction_N", Range::Between(0, 9), &tool->traction_N);
   if (auto entry = map.OptionalMap("meshes")) {
     ReadToolMeshes(*entry, *tool, folders, meshes);
   }

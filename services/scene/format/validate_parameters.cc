@@ -131,7 +131,7 @@ void CheckParameters(const SceneView& s) {
     CheckRange("scene", "shaft_length_m", i, tool.shaft_length_m, 0, 2);
     CheckRange("scene", "tip_radius_m", i, tool.tip_radius_m, 0, 0.05);
     CheckRange("scene", "tip_length_m", i, tool.tip_length_m, 0, 0.5);
-    CheckRange("scene", "traction_N", i, tool.traction_N, 0, 3);
+    CheckRange("scene", "traction_N", i, tool.traction_N, 0, 9);
   }
   if (s.node_mask >> kNodeCount != 0) {
     Fail("scene", "node_mask = ", s.node_mask, ": only ", kNodeCount, " nodes exist");

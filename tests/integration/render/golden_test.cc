@@ -176,7 +176,7 @@ class GoldenTest : public testing::Test {
       const auto k = static_cast<std::size_t>(tool);
       laparoscope.SetTool(tool, moment.tools.tools[k]);
       laparoscope.SetJaw(tool, moment.handles.handles[k].jaw_angle_rad);
-      hud.force_N[k] = 0.4f;
+      if (moment.tools.tools[k].kind != ToolKind::kNone) hud.force_N[k] = 0.4f;
     }
     laparoscope.SetTexts(HudTexts(hud, true));
     laparoscope.Update();
