@@ -35,7 +35,8 @@ fulcrum::ExitCode RunBridge(fulcrum::app::NodeApp& app) {
   const CalibrationStore calibrations = CalibrationStore::Load(CalibrationFolder());
   fulcrum::runtime::Log(fulcrum::runtime::LogLevel::kInfo, calibrations.Describe());
   HandleBridgeNode node(cart, calibrations, MakeCartLinks(cart, firmware.get()),
-                        &app.MakeOutput<fulcrum::HandleState>(), fulcrum::runtime::MonotonicNs());
+                        &app.MakeOutput<fulcrum::HandleState>(), fulcrum::runtime::MonotonicNs(),
+                        NeedsButtons(cart) ? &app.MakeInput<fulcrum::ToolState>() : nullptr);
   return app.Run(
       app.timing(), [&node](const fulcrum::Tick& tick) { node.Step(tick); },
       [&node](fulcrum::Health* health) { node.FillHealth(health); });

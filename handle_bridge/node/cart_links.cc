@@ -19,6 +19,7 @@ std::unique_ptr<WatchedLink> MakeLink(config::LinkKind kind, const config::Seria
   std::unique_ptr<ByteSourceOpener> opener;
   switch (kind) {
     case config::LinkKind::kNone:
+    case config::LinkKind::kButtons:
       return nullptr;
     case config::LinkKind::kSimulated:
     case config::LinkKind::kOperator:
@@ -40,7 +41,8 @@ bool Within(const std::vector<double>& ends_s, double time_s) {
 
 config::CartConfig ForScene(config::CartConfig cart, const SceneView& scene) {
   for (std::size_t tool = 0; tool < cart.handles.size(); ++tool) {
-    const bool real = cart.handles[tool].kind == config::LinkKind::kSerial;
+    const config::LinkKind kind = cart.handles[tool].kind;
+    const bool real = kind == config::LinkKind::kSerial || kind == config::LinkKind::kButtons;
     if (scene.tools[tool].kind == ToolKind::kNone && !real) cart.handles[tool].kind = config::LinkKind::kNone;
   }
   return cart;

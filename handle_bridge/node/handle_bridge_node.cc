@@ -36,10 +36,12 @@ JawChannelSettings MakeJawChannelSettings(const config::HandleConfig& handle, co
 }
 
 HandleBridgeNode::HandleBridgeNode(const config::CartConfig& cart, CalibrationStore calibrations, Links links,
-                                   bus::Output<HandleState>* output, std::int64_t epoch_ns)
+                                   bus::Output<HandleState>* output, std::int64_t epoch_ns,
+                                   bus::Input<ToolState>* tools)
     : handles_(cart.handles),
       calibrations_(std::move(calibrations)),
       links_(std::move(links)),
+      buttons_(cart, tools),
       output_(output),
       stamper_(epoch_ns) {
   for (std::size_t tool = 0; tool < jaws_.size(); ++tool) {
@@ -61,6 +63,7 @@ void HandleBridgeNode::Step(const Tick& tick) {
     snapshot_.stepping = true;
   }
   const double dt_s = periods * tick.dt_s;
+  buttons_.Read(tick.stamp_ns);
   for (std::size_t tool = 0; tool < jaws_.size(); ++tool) {
     state_.handles[tool] = ReadHandle(tool, dt_s);
   }
@@ -100,9 +103,14 @@ void HandleBridgeNode::TakeCalibration(std::size_t tool) {
 }
 
 HandleSample HandleBridgeNode::ReadHandle(std::size_t tool, double dt_s) {
-  if (!jaws_[tool]) {
-    return {};
-  }
+  const HandleSample line = jaws_[tool] ? ReadLine(tool, dt_s) : HandleSample();
+  LinkHealth& health = snapshot_.links[tool];
+  const bool by_button = buttons_.button(tool) > 0 && (!jaws_[tool] || health.state != LinkState::kOk);
+  health.button = by_button ? buttons_.button(tool) : 0;
+  return buttons_.Jaw(tool, line, by_button, dt_s);
+}
+
+HandleSample HandleBridgeNode::ReadLine(std::size_t tool, double dt_s) {
   JawChannel& jaw = *jaws_[tool];
   WatchedLink& link = *links_.handles[tool];
   LinkHealth& health = snapshot_.links[tool];
@@ -134,10 +142,11 @@ HandleSample HandleBridgeNode::ReadHandle(std::size_t tool, double dt_s) {
 }
 
 std::uint8_t HandleBridgeNode::ReadPedals(double dt_s) {
-  if (!links_.pedal) {
-    return kPedalNone;
-  }
   LinkHealth& health = snapshot_.links[kMaxTools];
+  if (!links_.pedal) {
+    snapshot_.pedals = buttons_.has_pedals() ? buttons_.Pedals() : std::uint8_t{kPedalNone};
+    return snapshot_.pedals;
+  }
   std::array<char, kReadBytes> buffer;
   const ByteLink::Result read = links_.pedal->Read(buffer);
   if (read.fresh) {
@@ -152,7 +161,9 @@ std::uint8_t HandleBridgeNode::ReadPedals(double dt_s) {
   health.state = links_.pedal->state(pedal_.state());
   health.reconnects = links_.pedal->reconnects();
   health.totals = pedal_.totals();
-  snapshot_.pedals = pedal_.pedals();
+  const bool by_button = buttons_.has_pedals() && health.state != LinkState::kOk;
+  health.button = by_button ? 1 : 0;
+  snapshot_.pedals = by_button ? buttons_.Pedals() : pedal_.pedals();
   return snapshot_.pedals;
 }
 
@@ -174,6 +185,11 @@ void HandleBridgeNode::FillHealth(Health* health) const {
       health->last_error += i < kMaxTools ? std::string("handle ") + std::to_string(i) : "pedal";
       health->last_error +=
           std::string(": ") + Code(link.state) + (first ? std::string(": ") + Explain(link.state) : "");
+      if (link.button > 0) {
+        health->last_error +=
+            i < kMaxTools ? "; meanwhile button " + std::to_string(link.button) + " of its haptic device closes the jaw"
+                          : "; meanwhile buttons of the haptic devices are the pedals";
+      }
       health->state = HealthState::kDegraded;
     }
     if (i < kMaxTools) {

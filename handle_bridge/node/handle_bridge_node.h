@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "handle_bridge/node/button_hands.h"
 #include "handle_bridge/node/calibration_store.h"
 #include "handle_bridge/node/jaw_channel.h"
 #include "handle_bridge/node/pedal_channel.h"
@@ -38,8 +39,9 @@ class HandleBridgeNode {
 
   /// @param calibrations stored calibrations of all units that may be connected.
   /// @param epoch_ns CLOCK_MONOTONIC now [ns].
+  /// @param tools where the buttons of the haptic devices come from; null: no button operates anything.
   HandleBridgeNode(const config::CartConfig& cart, CalibrationStore calibrations, Links links,
-                   bus::Output<HandleState>* output, std::int64_t epoch_ns);
+                   bus::Output<HandleState>* output, std::int64_t epoch_ns, bus::Input<ToolState>* tools = nullptr);
 
   /// One period: reads the links, estimates the jaw angles, publishes HandleState.
   void Step(const Tick& tick);
@@ -49,6 +51,7 @@ class HandleBridgeNode {
  private:
   struct LinkHealth {
     bool configured = false;
+    int button = 0;  // That stands in for the line now; 0: none.
     LinkState state = LinkState::kReconnecting;
     float quality = 0;
     float jaw_deg = 0;
@@ -65,6 +68,7 @@ class HandleBridgeNode {
   void DropBacklog();
   void TakeCalibration(std::size_t tool);
   [[nodiscard]] HandleSample ReadHandle(std::size_t tool, double dt_s);
+  [[nodiscard]] HandleSample ReadLine(std::size_t tool, double dt_s);
   [[nodiscard]] std::uint8_t ReadPedals(double dt_s);
 
   std::array<config::HandleConfig, kMaxTools> handles_;
@@ -73,6 +77,7 @@ class HandleBridgeNode {
   Links links_;
   std::array<std::optional<JawChannel>, kMaxTools> jaws_;
   PedalChannel pedal_;
+  ButtonHands buttons_;
   bus::Output<HandleState>* output_;
   bus::Stamper stamper_;
   std::uint64_t next_index_ = 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace fulcrum::haptics {
@@ -23,6 +24,7 @@ Vec3d TouchDevice::ReadPosition(const Tick& tick) noexcept {
   if (driver_->link(tool_).sample.TryTake(&sample_)) {
     sample_ns_ = tick.stamp_ns;
     has_reading_ = true;
+    TrackRoll();
   }
   TrackPresence(has_reading_ && 1e-9 * static_cast<double>(tick.stamp_ns - sample_ns_) <= kTouchStale_s, dt);
   TrackHeat(dt);
@@ -49,6 +51,16 @@ void TouchDevice::TrackPresence(bool present, double dt) noexcept {
     }
   }
   present_ = present;
+}
+
+// From the device's x axis, projected on the plane across the stylus.
+void TouchDevice::TrackRoll() noexcept {
+  constexpr double kLeastSine = 0.1;  // Nearer to x the projection has no direction.
+  const Vec3d& d = sample_.d_D;
+  const Vec3d level = Vec3d::UnitX() - d.x() * d;
+  const double angle = std::atan2(d.dot(level.cross(sample_.x_D)), level.dot(sample_.x_D));
+  if (level.norm() < kLeastSine || !std::isfinite(angle)) return;
+  roll_ += std::remainder(angle - roll_, 2 * std::numbers::pi);
 }
 
 void TouchDevice::TrackHeat(double dt) noexcept {

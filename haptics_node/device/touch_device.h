@@ -27,12 +27,19 @@ class TouchDevice final : public HapticDevice {
               const Vec3d& parked_W);
 
   [[nodiscard]] Vec3d ReadPosition(const Tick& tick) noexcept override;
+  /// Rotation of the stylus about its axis, continuous; held while the device is lost.
+  [[nodiscard]] float ReadRoll() const noexcept override { return static_cast<float>(roll_); }
+  /// None while the device is lost.
+  [[nodiscard]] std::uint8_t ReadButtons() const noexcept override {
+    return present_ ? static_cast<std::uint8_t>(sample_.buttons) : std::uint8_t{0};
+  }
   void WriteForce(const Vec3d& f_W) noexcept override;
   [[nodiscard]] DeviceHealth Describe() const override;
 
  private:
   void TrackPresence(bool present, double dt) noexcept;
   void TrackHeat(double dt) noexcept;
+  void TrackRoll() noexcept;
 
   std::shared_ptr<TouchDriver> driver_;
   std::size_t tool_;
@@ -47,6 +54,7 @@ class TouchDevice final : public HapticDevice {
   Vec3d offset_W_ = Vec3d::Zero();  ///< From the hand to the tool at the time of reconnection [m].
   double glide_ = 0;                ///< Remaining fraction of the offset, before smoothing, 1 … 0.
   double presence_ = 0, coolness_ = 1;
+  double roll_ = 0;  ///< [rad]
   std::atomic<double> gain_{0};
 };
 

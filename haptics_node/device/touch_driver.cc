@@ -129,6 +129,7 @@ void TouchDriver::Read(Device* device, bool slow) noexcept {
   device->bad_position.store(!good, std::memory_order_relaxed);
   if (!good || device->state.load(std::memory_order_relaxed) != State::kReady) return;
   sample.d_D = axis / length;
+  sample.x_D = transform.topLeftCorner<3, 3>().col(0);
   device->link->sample.Store(sample);
 }
 

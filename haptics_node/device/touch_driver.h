@@ -30,6 +30,7 @@ namespace fulcrum::haptics {
 struct TouchSample {
   Vec3d p_D = Vec3d::Zero();    ///< Attach point [m].
   Vec3d d_D = -Vec3d::UnitZ();  ///< Unit vector along the tool, towards its tip: -z of the stylus.
+  Vec3d x_D = Vec3d::UnitX();   ///< Unit vector across the stylus, fixed to it.
   int buttons = 0;              ///< Bit per pressed button.
 };
 

@@ -60,7 +60,7 @@ void Overlay::Set(std::span<const OverlayText> texts) {
                                2.0f * static_cast<float>(y + dy * glyph_height) / static_cast<float>(height_) - 1,
                                0.0f);
         coordinates.push_back(
-            {static_cast<float>((glyph + dx) * kGlyphWidth * dot_ / 2) / static_cast<float>(sheet_width_),
+            {static_cast<float>((glyph + dx) * kGlyphWidth * dot_) / 2.0f / static_cast<float>(sheet_width_),
              static_cast<float>(dy), 0, 0});
         colours.push_back(text.warning ? kWarning : kText);
       }

@@ -108,7 +108,8 @@ void AddView(const SceneView& assessed, std::vector<KnownAnswer>* answers) {
   std::vector<Vec3f> nodes;
   std::vector<Vec2f> materials;
   for (std::uint32_t i = 0; i < kNodes * kNodes; ++i) {
-    materials.emplace_back(kSpacing_m * static_cast<float>(i % kNodes), kSpacing_m * static_cast<float>(i / kNodes));
+    const std::uint32_t row = i / kNodes, column = i % kNodes;
+    materials.emplace_back(kSpacing_m * static_cast<float>(column), kSpacing_m * static_cast<float>(row));
     nodes.emplace_back(materials.back().x(), materials.back().y(), 0.0f);
   }
   SceneView scene = assessed;

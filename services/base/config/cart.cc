@@ -13,7 +13,8 @@ namespace {
 const StrictMap::Choices<LinkKind> kLinkKinds = {{"none", LinkKind::kNone},
                                                  {"simulated", LinkKind::kSimulated},
                                                  {"serial", LinkKind::kSerial},
-                                                 {"operator", LinkKind::kOperator}};
+                                                 {"operator", LinkKind::kOperator},
+                                                 {"buttons", LinkKind::kButtons}};
 const StrictMap::Choices<DeviceKind> kDeviceKinds = {{"none", DeviceKind::kNone},
                                                      {"simulated", DeviceKind::kSimulated},
                                                      {"touch", DeviceKind::kTouch},
@@ -29,6 +30,7 @@ constexpr std::array kBauds = {9600, 19200, 38400, 57600, 115200, 230400, 460800
 constexpr std::size_t kMaxCalibrationPoints = 9;
 constexpr int kMaxUsbId = 0xffff;
 constexpr std::size_t kMaxWindowEnds = 32;
+constexpr int kMaxButton = 8;  // Of a haptic device; a Touch has two.
 
 std::string ToolKey(std::size_t tool) { return std::string("tool") + std::to_string(tool); }
 
@@ -69,6 +71,11 @@ void ReadSimulated(StrictMap map, bool handle, SimulatedUnit* unit) {
     unit->tremor_rad = map.NumberSi("tremor_deg", unit->tremor_rad, Range::Between(0, 20));
     window("broken_wire_s", &unit->broken_wire_s);
   }
+}
+
+void ReadButton(StrictMap map, ToolButton* button) {
+  button->tool = static_cast<int>(map.Integer("tool", button->tool, 0, kMaxTools - 1));
+  button->button = static_cast<int>(map.Integer("button", button->button, 0, kMaxButton));
 }
 
 void ReadDevice(StrictMap map, DeviceConfig* device) {
@@ -112,12 +119,15 @@ CartConfig ReadCart(StrictYaml* file, CartConfig cart) {
     ReadLink(map, &handle.link);
     ReadSimulated(map.MapOrDefaults("simulated"), true, &handle.simulated);
     handle.hand = map.Choice("hand", handle.hand, kHands);
+    handle.button = static_cast<int>(map.Integer("button", handle.button, 0, kMaxButton));
     ReadCalibration(map.MapOrDefaults("calibration"), &handle.calibration);
   }
   StrictMap pedal = root.MapOrDefaults("pedal");
   cart.pedal.kind = pedal.Choice("kind", cart.pedal.kind, kLinkKinds);
   ReadLink(pedal, &cart.pedal.link);
   ReadSimulated(pedal.MapOrDefaults("simulated"), false, &cart.pedal.simulated);
+  ReadButton(pedal.MapOrDefaults("cut"), &cart.pedal.cut);
+  ReadButton(pedal.MapOrDefaults("coag"), &cart.pedal.coag);
   StrictMap generator = root.MapOrDefaults("generator");
   const auto power = [&generator](const char* key, float* power_W) {
     *power_W = static_cast<float>(

@@ -14,7 +14,8 @@
 
 namespace fulcrum::config {
 
-enum class LinkKind { kNone, kSimulated, kSerial, kOperator };
+/// kButtons: the buttons of the haptic devices.
+enum class LinkKind { kNone, kSimulated, kSerial, kOperator, kButtons };
 
 /// Place and speed of a serial line; the format is 8N1 without flow control.
 struct SerialLink {
@@ -53,12 +54,21 @@ struct SimulatedUnit {
 
 enum class Hand { kLeft, kRight };
 
+/// A button of a haptic device.
+struct ToolButton {
+  int tool = 0;
+  int button = 0;  ///< From 1, the one nearest to the tip; 0: none.
+};
+
 /// One handle; its index in CartConfig::handles is the tool that it operates.
 struct HandleConfig {
   LinkKind kind = LinkKind::kNone;
-  SerialLink link;             ///< For kSerial.
-  SimulatedUnit simulated;     ///< For kSimulated.
-  Hand hand = Hand::kLeft;     ///< Hand whose frames are accepted; a plain line does not contain it. Tool 1: right.
+  SerialLink link;          ///< For kSerial.
+  SimulatedUnit simulated;  ///< For kSimulated.
+  Hand hand = Hand::kLeft;  ///< Hand whose frames are accepted; a plain line does not contain it. Tool 1: right.
+  /// For kButtons, and for kSerial while the handle is not there and the tool's device is a Touch: the button of that
+  /// device, from 1, which closes the jaw; 0: none.
+  int button = 1;
   JawCalibration calibration;  ///< Used unless `handle_bridge calibrate` has stored a calibration for the unit.
 };
 
@@ -66,6 +76,8 @@ struct PedalConfig {
   LinkKind kind = LinkKind::kNone;
   SerialLink link;          ///< For kSerial.
   SimulatedUnit simulated;  ///< For kSimulated.
+  /// For kButtons, and for kSerial while the pedal is not there and the cart has a Touch.
+  ToolButton cut{1, 2}, coag{0, 2};
 };
 
 /// Power setting of the generator's panel at the start of a session, by mode [W].

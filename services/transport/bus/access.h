@@ -53,7 +53,7 @@ inline constexpr std::array kRoles{
     AccessRole{"supervisor", SetOf(kSceneManifest, kGeneratorSetting, kHealth),
                SetOf(kThermalEvent, kHealth, kToolState, kHandleState, kContactModel, kCauteryContact, kTopologyState,
                      kTemperaturePatch)},
-    AccessRole{"handle_bridge", kNodeWrites | SetOf(kHandleState), kNodeReads | SetOf(kOperatorInput)},
+    AccessRole{"handle_bridge", kNodeWrites | SetOf(kHandleState), kNodeReads | SetOf(kOperatorInput, kToolState)},
     AccessRole{"haptics_node", kNodeWrites | SetOf(kToolState, kTickManifest),
                kNodeReads | SetOf(kContactModel, kOperatorInput)},
     AccessRole{"physics_node",

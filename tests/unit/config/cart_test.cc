@@ -122,6 +122,8 @@ TEST_P(RefusedCart, SaysFileFieldAndValidRange) {
 const BadCart kBadCarts[] = {
     {"DomainZero", "domain: 0", "domain: '0' is not valid; valid: an integer from 1 to 100"},
     {"DomainAbove", "domain: 101", "1 to 100"},
+    {"UnknownButton", "handles: {tool0: {kind: buttons, button: 9}}", "handles.tool0.button"},
+    {"ButtonOfUnknownTool", "pedal: {kind: buttons, cut: {tool: 4}}", "pedal.cut.tool"},
     {"UnknownTool", "handles: {tool4: {kind: simulated}}", "handles.tool4: unknown key"},
     {"UnknownLinkKind", "handles: {tool0: {kind: usb}}", "valid: none, simulated, serial, operator"},
     {"UnknownDevice", "devices: {tool0: {kind: omega}}", "valid: none, simulated, touch, operator"},

@@ -11,35 +11,12 @@
 #include "handle_bridge/protocol/pedal_line.h"
 #include "handle_bridge/simulation/jaw_firmware.h"
 #include "services/transport/bus/in_process.h"
+#include "tests/unit/handle/memory_link.h"
 
 namespace fulcrum::handle_bridge {
 namespace {
 
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
-
-/// A link in memory: bytes that the test adds are read at the next tick.
-class MemoryLink final : public ByteLink {
- public:
-  Result Read(std::span<char> buffer) noexcept override {
-    const std::size_t n = std::min(buffer.size(), bytes.size());
-    std::copy_n(bytes.begin(), n, buffer.begin());
-    bytes.erase(0, n);
-    const bool was_fresh = std::exchange(fresh, false);
-    return {n, phase, was_fresh};
-  }
-  std::string_view unit() const noexcept override { return serial_number; }
-  bool SetBaud(int new_baud) noexcept override {
-    baud = new_baud;
-    fresh = true;
-    bytes.clear();
-    return true;
-  }
-  std::string bytes;
-  std::string serial_number;
-  int baud = 115200;
-  LinkPhase phase = LinkPhase::kOpen;
-  bool fresh = true;
-};
 
 /// A node with two handles and a pedal in memory, ticked by hand.
 class NodeTest : public ::testing::Test {

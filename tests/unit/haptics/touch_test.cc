@@ -379,5 +379,29 @@ TEST_F(Touch, WorksWithASchedulerOnAThreadOfItsOwn) {
   EXPECT_FALSE(rig.hd->devices[0].open);
 }
 
+TEST_F(Touch, ButtonsAndTheTurnOfTheStylusArrive) {
+  Open(kLeft);
+  Run(600);
+  EXPECT_EQ(devices[0]->ReadButtons(), 0);
+  rig.hd->devices[0].buttons = 3;
+  Run(5);
+  EXPECT_EQ(devices[0]->ReadButtons(), 3);
+  // Three quarters of a turn about the stylus, in steps; its axis is the device's z, so the tool's points to -z.
+  const float before = devices[0]->ReadRoll();
+  for (int i = 1; i <= 90; ++i) {
+    const double angle = -3 * std::numbers::pi / 180 * i;
+    auto& transform = rig.hd->devices[0].transform;
+    transform[0] = transform[5] = std::cos(angle);
+    transform[1] = std::sin(angle);
+    transform[4] = -std::sin(angle);
+    Run(2);
+  }
+  EXPECT_NEAR(devices[0]->ReadRoll() - before, 1.5 * std::numbers::pi, 0.01) << "without a jump at half a turn";
+  rig.hd->devices[0].plugged = false;
+  Run(200);
+  EXPECT_EQ(devices[0]->ReadButtons(), 0) << "a lost device presses nothing";
+  EXPECT_NEAR(devices[0]->ReadRoll() - before, 1.5 * std::numbers::pi, 0.01) << "and does not turn the tool";
+}
+
 }  // namespace
 }  // namespace fulcrum::haptics
