@@ -111,6 +111,7 @@ void Patch(Input input, std::vector<Byte>* good) {
 
 // One function for each target that deploy/fuzz runs; tests/fuzz/*/CMakeLists.txt names them.
 std::unique_ptr<Target> MakeCart();
+std::unique_ptr<Target> MakeCourse();
 std::unique_ptr<Target> MakeSceneYaml();
 std::unique_ptr<Target> MakeCompiledScene();
 std::unique_ptr<Target> MakeMeshMsh();
@@ -134,5 +135,6 @@ std::unique_ptr<Target> MakeConsoleRoute();
 std::unique_ptr<Target> MakeConsoleHttp();
 std::unique_ptr<Target> MakeHandleSerial();
 std::unique_ptr<Target> MakeHapticsGate();
+std::unique_ptr<Target> MakeSpaceMouse();
 
 }  // namespace fulcrum::fuzz
