@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <future>
 
@@ -34,6 +35,12 @@ void WarmUp(const SceneView& scene, Stage* stage) {
   view.SetScale(kFewPixels);
   Bitmap picture;
   stage->display->DrawAndRead(&picture);
+  if (std::any_of(scene.tools.begin(), scene.tools.end(),
+                  [](const ToolDescription& tool) { return tool.kind == ToolKind::kScope; })) {
+    view.SetSoil(1);
+    stage->display->DrawAndRead(&picture);
+    view.SetSoil(0);
+  }
   for (int k = 0; k < kMaxTools; ++k) {
     view.SetTool(k, ToolSample());
   }

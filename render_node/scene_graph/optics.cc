@@ -76,7 +76,9 @@ Optics::Optics(const Laparoscope& scope, int width, int height, osg::Node* backg
       picture_centre_(new osg::Uniform("picture_centre", osg::Vec2())),
       texture_scale_(new osg::Uniform("texture_scale", osg::Vec2(1, 1))),
       texture_most_(new osg::Uniform("texture_most", osg::Vec2(1, 1))),
-      soil_(new osg::Uniform("soil", 0.0f)) {
+      soil_(new osg::Uniform("soil", 0.0f)),
+      clear_lens_(MakeProgram("field.vert", "field.frag")),
+      soiled_lens_(MakeProgram("field.vert", "soiled.frag")) {
   osg::StateSet* state = node_->getOrCreateStateSet();
   state->addUniform(circle_radius_);
   state->addUniform(picture_centre_);
@@ -142,7 +144,8 @@ Optics::Target Optics::MakeTarget(int order, osg::Node* content) {
 
 void Optics::AddField() {
   Mesh field("field", false);
-  field.state()->setAttributeAndModes(MakeProgram("field.vert", "field.frag"));
+  field_state_ = field.state();
+  field_state_->setAttributeAndModes(clear_lens_);
   field.state()->addUniform(new osg::Uniform("scene_picture", static_cast<int>(kPictureUnit)));
   field.state()->addUniform(texture_scale_);
   field.state()->addUniform(texture_most_);
@@ -193,6 +196,11 @@ void Optics::SetScope(const Laparoscope& scope) {
     camera->setProjectionMatrix(ToOsg(scope.projection));
   }
   BackgroundChanged();
+}
+
+void Optics::SetSoil(float soil) {
+  soil_->set(soil);
+  field_state_->setAttributeAndModes(soil > 0 ? soiled_lens_ : clear_lens_);
 }
 
 void Optics::SceneChanged() { scene_.camera->setNodeMask(~0u); }

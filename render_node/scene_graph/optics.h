@@ -4,6 +4,7 @@
 #pragma once
 
 #include <osg/Camera>
+#include <osg/Program>
 #include <osg/Texture2D>
 
 #include "render_node/geometry/laparoscope.h"
@@ -22,7 +23,7 @@ class Optics {
   /// Moves the camera; the size of the picture does not change.
   void SetScope(const Laparoscope& scope);
   /// 0: clear lens … 1: nothing to be seen (services/base/core/lens.h).
-  void SetSoil(float soil) { soil_->set(soil); }
+  void SetSoil(float soil);
   /// Must be called when the scene has changed since its last picture.
   void SceneChanged();
   [[nodiscard]] osg::Group* node() const { return node_; }
@@ -44,6 +45,8 @@ class Optics {
   float scale_ = 1;
   osg::ref_ptr<osg::Group> node_;
   osg::ref_ptr<osg::Uniform> circle_radius_, picture_centre_, texture_scale_, texture_most_, soil_;
+  osg::ref_ptr<osg::Program> clear_lens_, soiled_lens_;
+  osg::ref_ptr<osg::StateSet> field_state_;
   Target background_, scene_;
 };
 

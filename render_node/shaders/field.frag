@@ -1,24 +1,9 @@
-// Puts the scene, drawn with fewer pixels, into the picture, through a lens that may be soiled.
+// Puts the scene, drawn with fewer pixels, into the picture.
 #version 130
 
 in vec2 place;
 uniform sampler2D scene_picture;
 uniform vec2 texture_most;
-uniform float soil;  // 0 clear ... 1 nothing to be seen
 out vec4 fragment;
 
-const float kReach = 0.035;  // Of the blur, as a share of the picture.
-const vec3 kScattered = vec3(0.72, 0.67, 0.65);
-
-vec4 seen(vec2 at) { return texture(scene_picture, clamp(at, vec2(0), texture_most)); }
-
-void main() {
-  fragment = seen(place);
-  if (soil > 0.0) {
-    vec2 x = vec2(kReach * soil, 0), y = x.yx;
-    vec4 around = seen(place + x) + seen(place - x) + seen(place + y) + seen(place - y) +
-                  seen(place + 0.6 * (x + y)) + seen(place - 0.6 * (x + y)) + seen(place + 0.6 * (x - y)) +
-                  seen(place - 0.6 * (x - y));
-    fragment.rgb = mix((fragment + around).rgb / 9.0, kScattered, 0.6 * soil);
-  }
-}
+void main() { fragment = texture(scene_picture, min(place, texture_most)); }
