@@ -114,7 +114,8 @@ std::optional<NodeMemory> ReadCheckpoint(std::span<const std::byte> payload, Tis
     size += sizeof(HeldRecord) * std::size_t{tool.held_count};
   }
   size += header.torn_bytes;
-  if (payload.size() != size || header.unused != 0 || header.steps > kMostSteps ||
+  if (payload.size() != size || header.particle_count != simulation->particles().particle_count() ||
+      header.unused != 0 || header.steps > kMostSteps ||
       !(header.max_displacement_m >= 0 && header.max_displacement_m <= kMostCoordinate_m) ||
       !std::isfinite(header.contact_time_s)) {
     return std::nullopt;
