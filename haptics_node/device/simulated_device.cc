@@ -68,4 +68,19 @@ Vec3d SimulatedDevice::ReadPosition(const Tick& tick) noexcept {
   return hand_.position();
 }
 
+Vec3d RestOf(const SceneView& scene, std::uint32_t tool) {
+  const Trocar trocar{scene.tools[tool].p_WP.cast<double>(), scene.tools[tool].shaft_length_m};
+  return scene.tools[tool].kind == ToolKind::kScope ? AttachPointForTip(trocar, scene.render.scope_tip_W.cast<double>())
+                                                    : RestingAttachPoint(trocar);
+}
+
+std::unique_ptr<SimulatedDevice> MakeScriptedDevice(const SceneView& scene, std::uint32_t tool, const HandModel& hand) {
+  const ToolDescription& description = scene.tools[tool];
+  const Trocar trocar{description.p_WP.cast<double>(), description.shaft_length_m};
+  auto device = std::make_unique<SimulatedDevice>(hand, trocar, scene.script, tool);
+  device->set_traction(static_cast<double>(scene.haptics.force_scale * description.traction_N));
+  device->set_rest(RestOf(scene, tool));
+  return device;
+}
+
 }  // namespace fulcrum::haptics

@@ -67,4 +67,11 @@ class SimulatedDevice final : public HapticDevice {
   Vec3d sent_ = Vec3d::Zero();    ///< Force on the hand, before its scale [N].
 };
 
+/// The scripted hand of a scene's tool: an assistant's keeps its traction, and a scope rests where it shows what the
+/// scene's `render` describes. @param scene must outlive the device.
+[[nodiscard]] std::unique_ptr<SimulatedDevice> MakeScriptedDevice(const SceneView& scene, std::uint32_t tool,
+                                                                  const HandModel& hand);
+/// Attach point of a scene's tool that is not moved [m].
+[[nodiscard]] Vec3d RestOf(const SceneView& scene, std::uint32_t tool);
+
 }  // namespace fulcrum::haptics

@@ -50,25 +50,14 @@ WorkspaceMap MapOf(const config::CartConfig& cart, std::size_t tool, const Vec3d
   return map;
 }
 
-/// Attach point of a tool that nothing moves: a scope shows what the scene's `render` describes.
-Vec3d RestOf(const SceneView& scene, std::uint32_t tool, const Trocar& trocar) {
-  return scene.tools[tool].kind == ToolKind::kScope ? AttachPointForTip(trocar, scene.render.scope_tip_W.cast<double>())
-                                                    : RestingAttachPoint(trocar);
-}
-
-std::unique_ptr<SimulatedDevice> MakeSimulated(const DeviceConfig& device, const SceneView& scene, const Trocar& trocar,
-                                               std::uint32_t tool, const WorkspaceMap& map) {
+std::unique_ptr<SimulatedDevice> MakeSimulated(const DeviceConfig& device, const SceneView& scene, std::uint32_t tool,
+                                               const WorkspaceMap& map) {
   const HandModel hand = HandOf(device.hand, scene.haptics);
-  std::unique_ptr<SimulatedDevice> made;
-  if (device.motion.empty()) {
-    made = std::make_unique<SimulatedDevice>(hand, trocar, scene.script, tool);
-  } else {
-    made = std::make_unique<SimulatedDevice>(
-        hand, std::make_shared<const RecordedMotion>(RecordedMotion::Load(device.motion)), map);
-  }
+  auto made = device.motion.empty()
+                  ? MakeScriptedDevice(scene, tool, hand)
+                  : std::make_unique<SimulatedDevice>(
+                        hand, std::make_shared<const RecordedMotion>(RecordedMotion::Load(device.motion)), map);
   made->set_force_scale(device.force_scale);
-  made->set_traction(static_cast<double>(scene.haptics.force_scale * scene.tools[tool].traction_N));
-  made->set_rest(RestOf(scene, tool, trocar));
   return made;
 }
 
@@ -124,7 +113,7 @@ CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& sce
       case DeviceKind::kSimulated: {
         const WorkspaceMap map =
             device.motion.empty() ? WorkspaceMap() : MapOf(cart, i, trocar.p_WP, "", trocars, &made.notes);
-        auto simulated = MakeSimulated(device, scene, trocar, i, map);
+        auto simulated = MakeSimulated(device, scene, i, map);
         if (assists) simulated->set_script_end(LastHoldOf(scene.script, i));
         made.devices[i] = std::move(simulated);
         break;
@@ -132,8 +121,7 @@ CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& sce
       case DeviceKind::kOperator: {
         // The rest of the script is the simulated operator's.
         const ScriptPoint first = FirstInView(scene, i);
-        const Vec3d start =
-            first.present ? AttachPointForTip(trocar, first.p_W.cast<double>()) : RestOf(scene, i, trocar);
+        const Vec3d start = first.present ? AttachPointForTip(trocar, first.p_W.cast<double>()) : RestOf(scene, i);
         auto operated = std::make_unique<OperatedDevice>(HandOf(device.hand, scene.haptics), trocar, start);
         operated->set_force_scale(device.force_scale);
         made.notes.push_back("tool " + std::to_string(i) + ": moved by the operator's input");
@@ -145,7 +133,7 @@ CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& sce
         const std::string& serial = found.empty() ? device.serial : found;
         const WorkspaceMap map = MapOf(cart, i, trocar.p_WP, serial, trocars, &made.notes);
         made.notes.push_back("tool " + std::to_string(i) + ": " + (trouble.empty() ? "Touch " + serial : trouble));
-        made.devices[i] = std::make_unique<TouchDevice>(driver, i, map, device.force_scale, RestOf(scene, i, trocar));
+        made.devices[i] = std::make_unique<TouchDevice>(driver, i, map, device.force_scale, RestOf(scene, i));
         break;
       }
     }

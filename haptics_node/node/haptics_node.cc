@@ -14,13 +14,7 @@ DeviceArray MakeScriptedDevices(const SceneView& scene, const std::array<bool, k
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
     const ToolDescription& tool = scene.tools[i];
     if (tool.kind == ToolKind::kNone || !simulated[i]) continue;
-    const Trocar trocar{tool.p_WP.cast<double>(), tool.shaft_length_m};
-    auto device = std::make_unique<SimulatedDevice>(scene.haptics, trocar, scene.script, i);
-    device->set_traction(static_cast<double>(scene.haptics.force_scale * tool.traction_N));
-    if (tool.kind == ToolKind::kScope) {
-      device->set_rest(AttachPointForTip(trocar, scene.render.scope_tip_W.cast<double>()));
-    }
-    devices[i] = std::move(device);
+    devices[i] = MakeScriptedDevice(scene, i, scene.haptics);
   }
   return devices;
 }
