@@ -66,7 +66,7 @@ class SimulatedFirmware {
  private:
   struct Link {
     explicit Link(std::uint64_t seed) : cable(seed) {}
-    bool used = false;  ///< Somebody has asked for its opener.
+    bool used = false;  ///< MakeOpener() was called for it.
     std::optional<PseudoTerminal> terminal;
     DamagedLine cable;
     std::uint8_t sequence = 0;

@@ -75,7 +75,7 @@ Gamepads::Gamepads() {
   SDL_SetHint(SDL_HINT_JOYSTICK_HIDAPI, "0");
   SDL_SetMainReady();
   if (SDL_InitSubSystem(kParts) != 0) throw std::runtime_error(std::string("gamepads: ") + SDL_GetError());
-  // States are read, so no events are needed; a queue that nobody reads would fill.
+  // States are read, so no events are needed; an unread queue would fill.
   SDL_JoystickEventState(SDL_IGNORE);
   SDL_GameControllerEventState(SDL_IGNORE);
 }

@@ -20,7 +20,7 @@ class PadInputs {
   /// Reads the devices and applies the first gamepad and the first SpaceMouse to the hands.
   /// @param now_ns CLOCK_MONOTONIC [ns].
   PadHands::Outcome Update(std::int64_t now_ns, MouseHands* hands);
-  /// @param force_N force at the tip of the operated tool; 0 while nobody operates.
+  /// @param force_N force at the tip of the operated tool; 0 while the controls are free.
   void Rumble(float force_N, std::int64_t now_ns);
 
   /// How long the caller may wait before the next Update() [ms]: SDL has no descriptor to wait for, and a stick that is

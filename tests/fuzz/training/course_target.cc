@@ -15,7 +15,7 @@ class Course final : public Target {
       const training::Course course = training::ReadCourse(file_.path());
       for (const training::Exercise& exercise : course.exercises) {
         Promise(!exercise.scene.empty(), "an exercise without a scene");
-        Promise(exercise.pass_pct >= 0 && exercise.pass_pct <= 100, "a score that nobody reaches");
+        Promise(exercise.pass_pct >= 0 && exercise.pass_pct <= 100, "a passing score out of range");
       }
       return Outcome::kAccepted;
     } catch (const InputError& refusal) {

@@ -208,7 +208,7 @@ TEST_F(RenderNodeTest, ThePictureIsThatOfTheHeldScope) {
   EXPECT_EQ(picture.header.eye_W, scope.p_WT);
   EXPECT_LT((picture.header.forward_W - shaft).norm(), 1e-5f);
   EXPECT_LT((picture.header.right_W - Vec3f::UnitX()).norm(), 1e-5f);
-  EXPECT_EQ(picture.header.present, 0b1011u) << "nobody operates the assistant";
+  EXPECT_EQ(picture.header.present, 0b1011u) << "the assistant is not operated by hand";
   EXPECT_EQ(picture.header.scopes, 0b1000u);
   const float wide = picture.header.pixel_rad;
   scope.q_WT = Quatf(turn) * Quatf(Eigen::AngleAxisf(0.4f, Vec3f::UnitZ()));

@@ -46,7 +46,7 @@ class Received {
 class WindowPad : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!screen_.installed()) GTEST_SKIP() << "Xvfb is not installed";
+    if (!screen_.installed()) GTEST_SKIP() << "Xvfb is not installed; apt install xvfb";
     window_ = std::make_unique<testing::BareWindow>(screen_.display());
     input_ = std::make_unique<WindowInput>(screen_.display(), window_->id(),
                                            [this](const OperatorInput& input) { received_.Add(input); });
@@ -84,7 +84,8 @@ TEST_F(WindowPad, OperatesFromThePlugToThePlug) {
       [](const OperatorInput& input) { return input.pedals == kPedalCut && input.tools[1].jaw_angle_rad == 0; }));
   const std::int64_t unplugged_ns = runtime::MonotonicNs();
   pad.Unplug();
-  ASSERT_TRUE(received_.Await([](const OperatorInput& input) { return input.claim_ns == 0; })) << "nobody operates";
+  ASSERT_TRUE(received_.Await([](const OperatorInput& input) { return input.claim_ns == 0; }))
+      << "the controls are free";
   const OperatorInput last = received_.newest();
   EXPECT_EQ(last.pedals, kPedalNone);
   EXPECT_FALSE(last.tools[1].moves);

@@ -86,7 +86,7 @@ class WindowTest : public ::testing::Test {
   }
 
   void SetUp() override {
-    if (!screen_.installed()) GTEST_SKIP() << "Xvfb is not installed: the window is not tested";
+    if (!screen_.installed()) GTEST_SKIP() << "Xvfb is not installed; apt install xvfb";
     ASSERT_FALSE(screen_.display().empty()) << "Xvfb does not answer on /tmp/.X11-unix";
     setenv("DISPLAY", screen_.display().c_str(), 1);
     node_ = std::make_unique<RenderNode>(view_, RenderSettings{.window = true, .frames = folder_}, bus_.ports());
