@@ -418,8 +418,11 @@ function goTo(view) {
 }
 for (const button of document.querySelectorAll('nav button')) button.addEventListener('click', () => goTo(button.dataset.goto));
 
+let recordings = '';
 async function loadRecordings() {
   const answer = await call('/api/recordings').then(r => r.json()).catch(() => ({recordings: []}));
+  if (JSON.stringify(answer) === recordings) return;
+  recordings = JSON.stringify(answer);
   $('recordings').replaceChildren(...answer.recordings.map(recording => {
     const item = make('li'), what = make('span', 'what'), button = make('button', '', 'Replay');
     const [session, file] = recording.name.split('/');

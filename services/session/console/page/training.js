@@ -22,7 +22,10 @@ const training = (() => {
     const answer = await call('/api/training').then(r => r.json()).catch(() => null);
     if (!answer) return;
     if (answer.text) return toast(answer.text, true);
+    // Only what has changed is made anew, and the button with the focus keeps it: the keyboard does not lose its place.
+    if (JSON.stringify(answer) === JSON.stringify(shown)) return;
     shown = answer;
+    const focus = document.activeElement, place = focus.getAttribute('aria-label'), attempt = focus.dataset.session;
     const person = answer.person;
     setText($('person'), person ? `${person}${answer.instructor ? ', instructor' : ''}` : 'Nobody has entered.');
     $('enter-form').hidden = !!person && !answer.instructor;
@@ -33,6 +36,10 @@ const training = (() => {
     const attempts = answer.attempts.map(showAttempt);
     $('attempts').replaceChildren(...attempts);
     if (!attempts.length) $('attempts').append(item('', person ? 'None yet: choose an exercise.' : 'Enter to see yours.'));
+    if (focus.isConnected) return;
+    const again = [...$('courses').querySelectorAll('button'), ...attempts.map(a => a.querySelector('button'))]
+      .find(b => attempt ? b.dataset.session === attempt : b.getAttribute('aria-label') === place);
+    if (again) again.focus();
   }
 
   function showCourse(course) {
