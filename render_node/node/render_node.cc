@@ -91,7 +91,7 @@ void RenderNode::Step(const Tick& tick) {
   // A new reader receives a picture even if nothing moves.
   const bool streamed = std::exchange(streams_, stream_ && stream_->has_readers());
   if (streams_ && !streamed) changed_on_screen_ = true;
-  const bool write = screenshot_ || (changed_in_file_ && session_time_s_ >= next_png_s_);
+  const bool write = writer_.has_folder() && (screenshot_ || (changed_in_file_ && session_time_s_ >= next_png_s_));
   screenshot_ = false;
   if (write || ((window_ || streams_) && changed_on_screen_)) {
     Draw(session_time_s_, write);
@@ -99,7 +99,7 @@ void RenderNode::Step(const Tick& tick) {
 }
 
 void RenderNode::Finish() {
-  if (ready() && changed_in_file_) {
+  if (writer_.has_folder() && ready() && changed_in_file_) {
     Draw(session_time_s_, true);
   }
 }

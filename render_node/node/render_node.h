@@ -41,7 +41,7 @@ struct RenderPorts {
 struct RenderSettings {
   bool window = false;               ///< Draw into a window instead of memory.
   Quality quality = Quality::kAuto;  ///< Resolution of the scene.
-  std::filesystem::path frames;      ///< Folder for the pictures.
+  std::filesystem::path frames;      ///< Folder for the pictures; empty: no files.
   InputSettings inputs = {};         ///< Gamepads as hands.
 };
 

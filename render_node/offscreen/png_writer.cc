@@ -49,6 +49,7 @@ Bitmap ReadPng(const std::filesystem::path& file) {
 }
 
 FrameWriter::FrameWriter(const std::filesystem::path& folder) : folder_(folder) {
+  if (folder_.empty()) return;
   std::filesystem::create_directories(folder_);
   thread_ = std::thread([this] { Work(); });
 }
@@ -59,7 +60,7 @@ FrameWriter::~FrameWriter() {
     stop_ = true;
   }
   wake_.notify_one();
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
 }
 
 bool FrameWriter::Add(Bitmap picture, double session_time_s) {

@@ -25,12 +25,14 @@ void WritePng(const Bitmap& picture, const std::filesystem::path& file);
 /// across a restart.
 class FrameWriter {
  public:
-  /// Throws std::runtime_error if the folder cannot be created.
+  /// @param folder empty: there are no files, and no picture may be added. Throws std::runtime_error if the folder
+  /// cannot be created.
   explicit FrameWriter(const std::filesystem::path& folder);
   ~FrameWriter();  ///< Writes all queued pictures, then ends the thread.
   FrameWriter(const FrameWriter&) = delete;
   FrameWriter& operator=(const FrameWriter&) = delete;
 
+  [[nodiscard]] bool has_folder() const { return !folder_.empty(); }
   /// Queues a picture. Returns false if the queue holds kQueue pictures already; this one is then dropped.
   bool Add(Bitmap picture, double session_time_s);
   /// Waits until all queued pictures have been written or have failed.

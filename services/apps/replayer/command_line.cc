@@ -14,6 +14,7 @@ namespace po = boost::program_options;
 constexpr const char* kUsage =
     R"(usage: replayer RECORDING --into NODE... [options]
        replayer RECORDING --live [--only NODE... | --except NODE...] [options]
+       replayer RECORDING --film
        replayer RECORDING --test NODE [--expect HASH] [--assert EXPR...] [options]
 
 Replays a recorded session: nodes compute its ticks again from exactly the recorded inputs, and after each tick their
@@ -34,6 +35,10 @@ development, or in place of a node.
 
   replayer out/latest/recording.mcap --live --except physics
 
+With --film the pictures are drawn for a program: it writes session times to the standard input, a line each, and reads
+from the standard output "TIME BYTES" and a JPEG file of BYTES bytes for each (0: the picture has not changed). The first
+line is "end TIME". Any order of times is possible; a step back takes longer.
+
 With --test one node computes all ticks of the session, also after states that differ, and its figures are checked
 against --expect and --assert; --junit writes the result for a CI system. Without --expect and --assert each state must
 equal the recorded one. fulcrum test-node does the same.
@@ -49,7 +54,8 @@ constexpr const char* kExitCodes =
 void AddOptions(po::options_description* options) {
   options->add_options()  //
       ("into", po::value<std::vector<std::string>>()->multitoken()->value_name("NODE"),
-       "nodes to replay, one or more of physics, thermal, haptics, render")  //
+       "nodes to replay, one or more of physics, thermal, haptics, render")       //
+      ("film", "draw the pictures of the times that come on the standard input")  //
       ("test", po::value<std::vector<std::string>>()->value_name("NODE"),
        "node to test: physics, thermal, haptics or render")  //
       ("expect", po::value<std::string>()->value_name("HASH"),

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdlib>
 #include <map>
 #include <memory>
 #include <optional>
@@ -12,6 +11,7 @@
 #include <thread>
 #include <type_traits>
 
+#include "services/apps/replayer/session_facts.h"
 #include "services/base/core/message_time.h"
 #include "services/base/runtime/cyclic_thread.h"
 #include "services/records/recording/time_order.h"
@@ -71,14 +71,6 @@ class ChannelOf final : public Channel {
 bool IsSent(TopicId topic, const std::vector<NodeId>& nodes) {
   const std::optional<NodeId> owner = bus::OwnerOf(topic);
   return !owner || std::find(nodes.begin(), nodes.end(), *owner) != nodes.end();
-}
-
-/// Log times are wall-clock times; the recorder has stored their offset from the clock of the stamps [ns].
-std::int64_t ClockOffset(const recording::McapReader& reader) {
-  const auto clock = reader.metadata().find("clock");
-  if (clock == reader.metadata().end()) return 0;
-  const auto offset = clock->second.find("log_time_minus_monotonic_ns");
-  return offset == clock->second.end() ? 0 : std::strtoll(offset->second.c_str(), nullptr, 10);
 }
 
 }  // namespace

@@ -19,6 +19,7 @@ int Run(int argc, char** argv) {
     return static_cast<int>(ExitCode::kDone);
   }
   if (options.live) return replay::RunLive(options.live_settings);
+  if (options.film) return replay::RunFilm(options);
   if (options.test) return replay::RunTest(options);
   return replay::RunReplay(options);
 }

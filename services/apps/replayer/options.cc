@@ -51,8 +51,8 @@ std::filesystem::path RecordingOf(const CommandLine& line) {
 
 void CheckKind(const CommandLine& line) {
   int kinds = 0;
-  for (const char* kind : {"into", "live", "test"}) kinds += line.Has(kind) ? 1 : 0;
-  if (kinds != 1) throw InputError("give one of --into NODE..., --live and --test NODE; see --help");
+  for (const char* kind : {"into", "live", "film", "test"}) kinds += line.Has(kind) ? 1 : 0;
+  if (kinds != 1) throw InputError("give one of --into NODE..., --live, --film and --test NODE; see --help");
 }
 
 LiveSettings LiveSettingsFrom(const CommandLine& line) {
@@ -141,8 +141,13 @@ Options ParseOptions(int argc, char** argv) {
   CheckKind(line);
   options.live = line.Has("live");
   options.test = line.Has("test");
+  options.film = line.Has("film");
   if (options.live) {
     options.live_settings = LiveSettingsFrom(line);
+    return options;
+  }
+  if (options.film) {
+    ReadFiles(line, &options);
     return options;
   }
   options.lock_step.nodes = NodesNamed(line, options.test ? "test" : "into", kReplayable);

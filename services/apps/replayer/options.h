@@ -15,7 +15,8 @@ namespace fulcrum::replay {
 struct Options {
   std::string answer;    ///< Text of help or version. Not empty: it is to be printed, and nothing else is set.
   bool live = false;     ///< --live was given: only `live_settings` is used.
-  bool test = false;     ///< --test was given: one node is checked against `demands`. Neither of both: --into.
+  bool test = false;     ///< --test was given: one node is checked against `demands`. None of these: --into.
+  bool film = false;     ///< --film was given: only `recording` of `lock_step` and `scene` are used.
   bool console = false;  ///< --console.
   LiveSettings live_settings;
   LockStepSettings lock_step;        ///< Without `folder`, which a run makes.

@@ -4,6 +4,7 @@
 
 #include "services/apps/replayer/changed_scene.h"
 #include "services/apps/replayer/console.h"
+#include "services/apps/replayer/film.h"
 #include "services/apps/replayer/lock_step_report.h"
 #include "services/apps/replayer/pictures.h"
 #include "services/apps/replayer/progress_line.h"
@@ -61,6 +62,12 @@ ExitCode CompareWithRecording(const Options& options, const LockStepSettings& se
 }
 
 }  // namespace
+
+int RunFilm(const Options& options) {
+  const scene::SceneFile scene(options.scene);
+  ShowFilm(options.lock_step.recording, scene.view(), std::cin, std::cout);
+  return static_cast<int>(ExitCode::kDone);
+}
 
 int RunReplay(const Options& options) {
   const scene::SceneFile scene(options.scene);

@@ -9,4 +9,7 @@ namespace fulcrum::replay {
 /// differed or the recording is incomplete. Throws InputError, MismatchError, std::runtime_error.
 int RunReplay(const Options& options);
 
+/// replayer --film, on standard input and output; see ShowFilm(). Returns the exit code; throws the same.
+int RunFilm(const Options& options);
+
 }  // namespace fulcrum::replay

@@ -4,9 +4,12 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <cstdlib>
 
 #include "services/base/config/cart.h"
 #include "services/base/core/messages.h"
+#include "services/records/recording/mcap_reader.h"
 #include "services/records/recording/recorded_scene.h"
 
 namespace fulcrum::replay {
@@ -18,6 +21,14 @@ namespace fulcrum::replay {
     period_s[static_cast<std::size_t>(node)] = 1e-9 * std::round(1e9 / cart.timing(node).rate_Hz);
   }
   return period_s;
+}
+
+/// Log times are wall-clock times; the recorder has stored their offset from the clock of the stamps [ns].
+[[nodiscard]] inline std::int64_t ClockOffset(const recording::McapReader& reader) {
+  const auto clock = reader.metadata().find("clock");
+  if (clock == reader.metadata().end()) return 0;
+  const auto offset = clock->second.find("log_time_minus_monotonic_ns");
+  return offset == clock->second.end() ? 0 : std::strtoll(offset->second.c_str(), nullptr, 10);
 }
 
 using recording::RefuseOtherScene;

@@ -1,0 +1,44 @@
+// render_node on a recording: the class that draws a session, on the recorded topics and their clock.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "render_node/node/render_node.h"
+#include "services/base/core/scene_view.h"
+
+namespace fulcrum::replay {
+
+class RenderReplay {
+ public:
+  /// @param pictures topic of the drawn pictures; null: none. `scene` and `pictures` must outlive it. Throws
+  /// InputError, and std::runtime_error when OpenGL is missing.
+  RenderReplay(const std::filesystem::path& recording, const SceneView& scene, const render::RenderSettings& settings,
+               bus::LoanOutput<Picture>* pictures = nullptr);
+  ~RenderReplay();
+  RenderReplay(const RenderReplay&) = delete;
+  RenderReplay& operator=(const RenderReplay&) = delete;
+
+  /// Hands the next message that the node reads to its ports. Returns the session time of the newest message so far
+  /// [s], or nullopt at the end of the recording. Throws MismatchError for a recording of another scene.
+  [[nodiscard]] std::optional<double> Next();
+
+  /// CLOCK_MONOTONIC at session time 0 [ns]; valid after Next() has returned a time.
+  [[nodiscard]] std::int64_t session_start_ns() const;
+
+  /// From now on leaves out TissueFrames that were recorded before a session time: reading is several times as fast.
+  void SkipTissueBefore(double time_s);
+
+  /// One step of the node with the messages handed over so far.
+  void Step(double time_s);
+
+  [[nodiscard]] render::RenderNode& node();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace fulcrum::replay
