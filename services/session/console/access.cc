@@ -10,11 +10,13 @@
 #include <optional>
 
 #include "services/base/core/error.h"
+#include "services/base/core/tick.h"
 #include "services/base/runtime/private_file.h"
 
 namespace fulcrum::console {
 namespace {
 
+constexpr std::int64_t kTicketLife = 60 * kSecond_ns;
 constexpr std::size_t kShortestToken = 16, kLongestToken = 256;
 
 bool IsTokenText(std::string_view text) {
@@ -80,6 +82,16 @@ std::string ReadToken(const std::filesystem::path& file) {
 
 void WriteToken(const std::filesystem::path& file, const std::string& token) {
   runtime::WritePrivateFile(file, token + "\n", "token file");
+}
+
+std::string Tickets::Issue(std::int64_t now_ns) {
+  if (tickets_.size() == kMost) tickets_.pop_front();
+  return tickets_.emplace_back(MakeToken(), now_ns + kTicketLife).text;
+}
+
+bool Tickets::Use(std::string_view ticket, std::int64_t now_ns) {
+  std::erase_if(tickets_, [&](const Ticket& one) { return one.end_ns <= now_ns; });
+  return std::erase_if(tickets_, [&](const Ticket& one) { return SameSecret(ticket, one.text); }) > 0;
 }
 
 Access::Access(std::string token, std::vector<std::string> names)

@@ -1,6 +1,9 @@
 // Access control of the console. Pure except for the functions on the token file.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -20,6 +23,23 @@ namespace fulcrum::console {
 [[nodiscard]] std::string ReadToken(const std::filesystem::path& file);
 /// Replaces the file by one that only its owner can read. Throws InputError.
 void WriteToken(const std::filesystem::path& file, const std::string& token);
+
+/// Tickets for addresses that a browser opens without the token: each is valid once and for a minute.
+class Tickets {
+ public:
+  /// Throws InputError as MakeToken(). The oldest of more than kMost is void.
+  [[nodiscard]] std::string Issue(std::int64_t now_ns);
+  /// True when the ticket is valid.
+  [[nodiscard]] bool Use(std::string_view ticket, std::int64_t now_ns);
+  static constexpr std::size_t kMost = 16;
+
+ private:
+  struct Ticket {
+    std::string text;
+    std::int64_t end_ns;
+  };
+  std::deque<Ticket> tickets_;  ///< Oldest first.
+};
 
 class Access {
  public:

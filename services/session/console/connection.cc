@@ -131,7 +131,7 @@ class ConnectionOver final : public Connection,
   void CloseSocket() override {
     if (web_) {
       --server().sockets;
-      server().service.sockets.closed(this);
+      service_->closed(this);
     }
     beast::error_code ignored;
     transport().socket().shutdown(tcp::socket::shutdown_both, ignored);
@@ -212,7 +212,7 @@ class ConnectionOver final : public Connection,
     HttpRequest request = Plain(message, kSecure);
     request.body = std::move(message.body());
     HttpResponse response = server().service.handle(request);
-    if (response.socket) return BeginSocket(message);
+    if (response.socket != nullptr) return BeginSocket(message, *response.socket);
     if (!response.stream) return Send(std::move(response), keep_alive);
     if (last_ || server().streams.size() >= server().limits.streams) return Refuse(503);
     BeginStream(response);
@@ -254,7 +254,7 @@ class ConnectionOver final : public Connection,
   }
 
   /// @param message the request, whose header asks for the change of protocol.
-  void BeginSocket(const http::request<http::string_body>& message) {
+  void BeginSocket(const http::request<http::string_body>& message, const SocketService& service) {
     if (!websocket::is_upgrade(message)) return Refuse(426);
     // A WebSocket is of a client with a ticket: it gives way to no guest.
     if (!known_) known_ = server().sockets < server().limits.sockets && server().admission.Recognise(id());
@@ -267,7 +267,8 @@ class ConnectionOver final : public Connection,
     web_->auto_fragment(false);
     ++server().sockets;
     accepting_ = true;  // What `opened` sends waits for the end of the handshake.
-    server().service.sockets.opened(this);
+    service_ = &service;
+    service.opened(this);
     auto request = std::make_shared<http::request<http::string_body>>(message);
     web_->async_accept(*request, [self = this->shared_from_this(), request](const beast::error_code& error) {
       if (error || !self->open()) return self->Close();
@@ -282,7 +283,7 @@ class ConnectionOver final : public Connection,
     web_->async_read(buffer_, [self = this->shared_from_this()](const beast::error_code& error, std::size_t) {
       if (error || !self->open()) return self->Close();
       const auto bytes = self->buffer_.data();
-      self->server().service.sockets.received(self.get(), {static_cast<const char*>(bytes.data()), bytes.size()});
+      self->service_->received(self.get(), {static_cast<const char*>(bytes.data()), bytes.size()});
       if (self->open()) self->ReadMessage();
     });
   }
@@ -321,6 +322,7 @@ class ConnectionOver final : public Connection,
   std::string part_;
   char last_word_ = 0;
   std::optional<websocket::stream<Stream&>> web_;
+  const SocketService* service_ = nullptr;  ///< Of `web_`.
   bool accepting_ = false;
   std::deque<Message> out_;  ///< The first is being sent.
 };

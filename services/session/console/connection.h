@@ -13,6 +13,7 @@
 
 #include "services/session/console/admission.h"
 #include "services/session/console/http_server.h"
+#include "services/session/console/socket.h"
 
 namespace fulcrum::console {
 

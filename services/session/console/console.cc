@@ -16,6 +16,7 @@
 #include "services/base/runtime/cyclic_thread.h"
 #include "services/base/runtime/realtime.h"
 #include "services/session/console/access.h"
+#include "services/session/console/attempt_films.h"
 #include "services/session/console/file_response.h"
 #include "services/session/console/guided_task.h"
 #include "services/session/console/http_server.h"
@@ -39,7 +40,6 @@ using runtime::MonotonicNs;
 
 constexpr auto kTurn = std::chrono::milliseconds(200);
 constexpr std::int64_t kFeedPeriod = kSecond_ns / 5;
-constexpr std::int64_t kTicketLife = 60 * kSecond_ns;
 constexpr std::size_t kMostRecordings = 50;
 constexpr const char* kTicketIsOld = "this address is valid once and for one minute; open it from the page";
 // A report contains its own style and pictures, and no scripts.
@@ -89,13 +89,12 @@ struct Console::Impl {
              .domain = given.domain}),
         watch(given.domain),
         training(given.database, given.courses, given.out),
+        films(
+            given.programs / "replayer", [this](const std::string& attempt) { return training.FolderOf(attempt); },
+            [this](std::function<void()> work) { server.Post(std::move(work)); }),
         server({.address = given.bind, .port = given.port, .tls = Identity()},
                {.handle = [this](const HttpRequest& request) { return Handle(request); },
-                .knows = [this](const HttpRequest& request) { return access->HasToken(request); },
-                .sockets = {.opened = [this](Socket* socket) { live.Open(socket); },
-                            .received = [this](Socket* socket,
-                                               std::string_view text) { live.Receive(socket, text, MonotonicNs()); },
-                            .closed = [this](Socket* socket) { live.Close(socket, MonotonicNs()); }}}) {
+                .knows = [this](const HttpRequest& request) { return access->HasToken(request); }}) {
     watch.OnLeave([this] { live.SetSession({}); });
     token_file = settings.token_file.empty() ? DefaultTokenFile(server.port()) : settings.token_file;
     std::error_code error;
@@ -110,8 +109,11 @@ struct Console::Impl {
     ShowSession(fs::read_symlink(settings.out / "latest", error).filename());
   }
 
-  // The bus calls the server for each picture: its ports end first.
-  ~Impl() { live.SetSession({}); }
+  // The bus and the films call the server for each picture: they end first.
+  ~Impl() {
+    live.SetSession({});
+    films.End();
+  }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
@@ -155,8 +157,9 @@ struct Console::Impl {
       case Wanted::kReport:
         return Report(TextIn(routed.fields, "ticket"));
       case Wanted::kLive:
-        if (!UseTicket(TextIn(routed.fields, "ticket"))) return Refusal(401, kTicketIsOld);
-        return {.socket = true};
+      case Wanted::kFilm:
+        if (!tickets.Use(TextIn(routed.fields, "ticket"), MonotonicNs())) return Refusal(401, kTicketIsOld);
+        return {.socket = routed.wanted == Wanted::kLive ? &live_sockets : &film_sockets};
       case Wanted::kState:
         return {.body = StateJson(0)};
       case Wanted::kEvents:
@@ -170,9 +173,7 @@ struct Console::Impl {
       case Wanted::kSummary:
         return FileResponse(SessionFile("summary.json"), "application/json");
       case Wanted::kTicket:
-        ticket = MakeToken();
-        ticket_end_ns = MonotonicNs() + kTicketLife;
-        return Done(ticket);
+        return Done(tickets.Issue(MonotonicNs()));
       case Wanted::kStart:
         return Start(routed.fields);
       case Wanted::kStop:
@@ -194,7 +195,6 @@ struct Console::Impl {
       case Wanted::kTrainingLeave:
       case Wanted::kAttempt:
       case Wanted::kAttemptEvents:
-      case Wanted::kAttemptPicture:
         return training.Answer(routed, settings.scenes);
       case Wanted::kEnter:
       case Wanted::kCancel:
@@ -213,15 +213,8 @@ struct Console::Impl {
     return {.type = std::string(file->type), .body = std::string(file->text)};
   }
 
-  /// True when the ticket is valid; it is valid once.
-  bool UseTicket(const std::string& given) {
-    const bool valid = !ticket.empty() && SameSecret(given, ticket) && MonotonicNs() < ticket_end_ns;
-    ticket.clear();
-    return valid;
-  }
-
   HttpResponse Report(const std::string& given) {
-    if (!UseTicket(given)) return Refusal(401, kTicketIsOld);
+    if (!tickets.Use(given, MonotonicNs())) return Refusal(401, kTicketIsOld);
     HttpResponse response = FileResponse(SessionFile("report.html"), "text/html; charset=utf-8");
     response.policy = kReportPolicy;
     return response;
@@ -412,6 +405,14 @@ struct Console::Impl {
     }
   }
 
+  const SocketService live_sockets{
+      .opened = [this](Socket* socket) { live.Open(socket); },
+      .received = [this](Socket* socket, std::string_view text) { live.Receive(socket, text, MonotonicNs()); },
+      .closed = [this](Socket* socket) { live.Close(socket, MonotonicNs()); }};
+  const SocketService film_sockets{
+      .opened = [this](Socket* socket) { films.Open(socket); },
+      .received = [this](Socket* socket, std::string_view text) { films.Receive(socket, text); },
+      .closed = [this](Socket* socket) { films.Close(socket); }};
   const ConsoleSettings settings;
   std::string token;
   fs::path token_file;
@@ -419,6 +420,7 @@ struct Console::Impl {
   SessionRun run;
   SessionWatch watch;
   TrainingCalls training;
+  AttemptFilms films;
   LiveView live;  ///< Its ports are those of `watch`.
   std::uint64_t live_session = 0;
   std::unique_ptr<GuidedTask> task;
@@ -426,8 +428,7 @@ struct Console::Impl {
   PictureWatch pictures;
   std::future<control::Reply> asking;
   Notice notice;
-  std::string ticket;
-  std::int64_t ticket_end_ns = 0;
+  Tickets tickets;
   std::int64_t next_feed_ns = 0;
   std::string fingerprint;  ///< Empty: no TLS.
   bool new_identity = false;

@@ -5,6 +5,8 @@
 
 namespace fulcrum::console {
 
+struct SocketService;
+
 struct HttpRequest {
   std::string method, target;
   std::string host, origin, fetch_site, authorization, content_type;  ///< Header fields; empty: missing.
@@ -18,7 +20,8 @@ struct HttpResponse {
   std::string body = {};
   std::string policy = {};  ///< Content-Security-Policy; empty: that of the page.
   bool stream = false;      ///< True: the body is the first of many parts, and the connection stays open.
-  bool socket = false;      ///< True: the connection becomes a WebSocket.
+  /// Not null: the connection becomes a WebSocket of this service, which outlives the server.
+  const SocketService* socket = nullptr;
 };
 
 }  // namespace fulcrum::console

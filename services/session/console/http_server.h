@@ -10,7 +10,6 @@
 
 #include "services/session/console/admission.h"
 #include "services/session/console/http_message.h"
-#include "services/session/console/socket.h"
 #include "services/session/console/tls_identity.h"
 
 namespace fulcrum::console {
@@ -18,7 +17,7 @@ namespace fulcrum::console {
 struct HttpLimits {
   Admission::Limits slots;
   std::size_t streams = 6;    ///< Connections that may be streams.
-  std::size_t sockets = 4;    ///< Connections that may be WebSockets.
+  std::size_t sockets = 8;    ///< Connections that may be WebSockets.
   std::size_t message = 256;  ///< Longest message of a WebSocket's client [B].
   std::uint32_t header_bytes = 8 * 1024;
   std::uint64_t body_bytes = 8 * 1024;
@@ -34,7 +33,6 @@ struct HttpService {
   std::function<HttpResponse(const HttpRequest&)> handle;
   /// True when the header of this request, without its body, has the token.
   std::function<bool(const HttpRequest&)> knows;
-  SocketService sockets = {};
 };
 
 struct ListenAddress {

@@ -57,8 +57,6 @@ constexpr Field kPinField{"pin", true, IsShortText, "4 to 12 digits"};
 constexpr std::array kAccountFields{kNameField, kPinField};
 constexpr std::array kNewAccountFields{kNameField, kPinField, Field{"instructor", false, IsOnOff, "on, off"}};
 constexpr std::array kAttemptFields{Field{"session", true, IsPlainName, "a session that /api/training lists"}};
-constexpr std::array kAttemptPictureFields{Field{"session", true, IsPlainName, "a session that /api/training lists"},
-                                           Field{"name", true, IsPictureName, "frame_<digits>.png"}};
 constexpr std::array kNodeFields{Field{"node", true, IsNode, "a node's name, for example physics_node"}};
 constexpr std::array kGeneratorFields{Field{"cut", false, IsKnob, "0 to 300 W"},
                                       Field{"coag", false, IsKnob, "0 to 300 W"},
@@ -89,7 +87,6 @@ constexpr std::array kEntries{
     Entry{"/api/training/leave", true, Wanted::kTrainingLeave, {}},
     Entry{"/api/attempt", false, Wanted::kAttempt, kAttemptFields},
     Entry{"/api/attempt/events", false, Wanted::kAttemptEvents, kAttemptFields},
-    Entry{"/api/attempt/picture", false, Wanted::kAttemptPicture, kAttemptPictureFields},
     Entry{"/api/start", true, Wanted::kStart, kStartFields},
     Entry{"/api/stop", true, Wanted::kStop, {}},
     Entry{"/api/restart", true, Wanted::kRestart, kNodeFields},
@@ -141,12 +138,15 @@ RouteResult Route(const Access& access, const HttpRequest& request) {
   const bool api = target->path.starts_with("/api/");
   if (!api) {
     if (post) return refuse(405, "GET");
-    // Browsers send no token with these two.
-    const bool live = target->path == "/live";
-    if (!live && target->path != "/report") return {Routed{Wanted::kPage, target->path, {}}, {}};
+    // Browsers send no token with these.
+    const bool live = target->path == "/live", film = target->path == "/film";
+    if (!live && !film && target->path != "/report") return {Routed{Wanted::kPage, target->path, {}}, {}};
     if (const std::string wrong = Wrong(target->query, kTicketFields); !wrong.empty()) return refuse(400, wrong);
-    if (live && !Access::IsOwnSite(request)) return refuse(403, "a page of another site may not use this console");
-    return {Routed{live ? Wanted::kLive : Wanted::kReport, target->path, target->query}, {}};
+    if ((live || film) && !Access::IsOwnSite(request)) {
+      return refuse(403, "a page of another site may not use this console");
+    }
+    const Wanted wanted = live ? Wanted::kLive : film ? Wanted::kFilm : Wanted::kReport;
+    return {Routed{wanted, target->path, target->query}, {}};
   }
   if (!Access::IsOwnSite(request)) return refuse(403, "a page of another site may not use this console");
   if (!access.HasToken(request))

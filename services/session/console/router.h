@@ -15,13 +15,14 @@ enum class Wanted {
   kPage,        ///< A file of the page; `path` is its path.
   kReport,      ///< The report; needs a ticket of kTicket.
   kLive,        ///< The live picture and the controls, as a WebSocket; needs a ticket of kTicket.
+  kFilm,        ///< The pictures of an attempt, as a WebSocket; needs a ticket of kTicket.
   kState,       ///< The present state of the page.
   kEvents,      ///< The state as a stream, repeatedly.
   kChoices,     ///< The scenes and their settings.
   kPicture,     ///< A picture. Field: name.
   kRecordings,  ///< The recordings that can be replayed.
   kSummary,     ///< Figures of the last session.
-  kTicket,      ///< A ticket that opens the report of the last session, or the live picture, once.
+  kTicket,      ///< A ticket that opens the report of the last session, the live picture or an attempt's, once.
   kStart,       ///< Starts a session. Fields: scene; optional power, seconds, record, picture_rate, hands,
                 ///< trainee (me, expert).
   kStop,
@@ -37,10 +38,9 @@ enum class Wanted {
   kTrainingEnter,  ///< Fields: name, pin.
   kTrainingNew,    ///< Makes an account. Fields: name, pin; optional instructor.
   kTrainingLeave,
-  kAttempt,         ///< Sheet and pictures of an attempt. Field: session.
-  kAttemptEvents,   ///< What happened when. Field: session.
-  kAttemptPicture,  ///< Fields: session, name.
-  kClose,           ///< Removes the ended task from the page.
+  kAttempt,        ///< Sheet of an attempt. Field: session.
+  kAttemptEvents,  ///< What happened when. Field: session.
+  kClose,          ///< Removes the ended task from the page.
 };
 
 struct Routed {

@@ -2,7 +2,6 @@
 
 #include "services/base/core/error.h"
 #include "services/base/runtime/cyclic_thread.h"
-#include "services/session/console/file_response.h"
 #include "services/session/console/library.h"
 
 namespace fulcrum::console {
@@ -37,10 +36,6 @@ HttpResponse TrainingCalls::Answer(const Routed& routed, const fs::path& scenes)
       const fs::path folder = desk_.FolderOf(TextIn(fields, "session"));
       if (folder.empty()) throw InputError("no attempt \"" + TextIn(fields, "session") + "\" of yours");
       return {.body = events_.JsonOf(folder)};
-    }
-    case Wanted::kAttemptPicture: {
-      const fs::path folder = desk_.FolderOf(TextIn(fields, "session"));
-      return FileResponse(folder.empty() ? folder : folder / "frames" / TextIn(fields, "name"), "image/png");
     }
     default:
       return Refusal(404, "unknown call of the training");

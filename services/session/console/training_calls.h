@@ -21,6 +21,9 @@ class TrainingCalls {
   /// Name of the person at the cart; empty: none.
   [[nodiscard]] std::string person() const { return desk_.person(); }
 
+  /// As TrainingDesk::FolderOf.
+  [[nodiscard]] std::filesystem::path FolderOf(const std::string& session) const { return desk_.FolderOf(session); }
+
   /// @param scenes folder of the scenes on offer. Throws InputError.
   [[nodiscard]] HttpResponse Answer(const Routed& routed, const std::filesystem::path& scenes);
 

@@ -20,30 +20,13 @@ using supervisor::TrainingRow;
 
 /// 43,000 guesses a day: a PIN of four digits is no secret from who stands at the cart, but takes hours.
 constexpr std::int64_t kAfterWrongPin = 2 * kSecond_ns;
-constexpr std::size_t kMostAttempts = 500, kMostPictures = 10'000;
+constexpr std::size_t kMostAttempts = 500;
 
 std::string JsonOf(const TrainingRow& row) {
   Json json('{');
   json.Text("trainee", row.trainee).Text("session", row.session).Text("scene", row.scene);
   json.Text("started", row.started_utc).Number("score", row.score_pct, 0.1).Flag("well", row.well);
   return json.Done();
-}
-
-std::vector<std::string> PicturesIn(const fs::path& folder) {
-  std::vector<std::string> names;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    if (entry->path().extension() == ".png") names.push_back(entry->path().filename().string());
-    if (names.size() == kMostPictures) break;
-  }
-  std::ranges::sort(names);
-  return names;
-}
-
-std::string PicturesJson(const fs::path& folder) {
-  Json list('[');
-  for (const std::string& name : PicturesIn(folder)) list.Item(JsonString(name));
-  return list.Done();
 }
 
 std::string TextOf(const fs::path& file) {
@@ -144,14 +127,12 @@ std::string TrainingDesk::AttemptJson(const std::string& session) const {
     if (session.ends_with("-" + row.scene)) expert = row.session;
   }
   Json json('{');
-  json.Raw("sheet", sheet).Raw("pictures", PicturesJson(folder / "frames")).Text("expert", expert);
+  json.Raw("sheet", sheet).Text("expert", expert);
   Json labels('{');
   for (const MeasureInfo& info : kMeasures) {
     labels.Text(info.key, std::string(info.label) + (*info.unit == '\0' ? "" : std::string(" [") + info.unit + "]"));
   }
-  json.Raw("labels", labels.Done());
-  json.Raw("expert_pictures", expert.empty() ? "[]" : PicturesJson(out_ / expert / "frames"));
-  return json.Done();
+  return json.Raw("labels", labels.Done()).Done();
 }
 
 }  // namespace fulcrum::console

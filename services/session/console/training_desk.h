@@ -34,9 +34,9 @@ class TrainingDesk {
   [[nodiscard]] std::string OverviewJson(const std::vector<SceneChoice>& scenes) const;
   /// The same as CSV, with all measures.
   [[nodiscard]] std::string Csv() const;
-  /// A session's folder, for the sheet and the pictures; empty: the person may not see it.
+  /// A session's folder; empty: the person may not see it.
   [[nodiscard]] std::filesystem::path FolderOf(const std::string& session) const;
-  /// Sheet and pictures of an attempt, and the name of the newest session of its exercise by the expert.
+  /// Sheet of an attempt, and the name of the newest session of its exercise by the expert.
   [[nodiscard]] std::string AttemptJson(const std::string& session) const;
 
  private:

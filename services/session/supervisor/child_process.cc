@@ -55,7 +55,8 @@ void Become(const char* program, char* const* arguments, const ChildStreams& str
   if (::setpgid(0, 0) != 0) return;
   const int input = streams.input >= 0 ? streams.input : ::open("/dev/null", O_RDONLY | O_CLOEXEC);
   if (input < 0 || ::dup2(input, STDIN_FILENO) < 0) return;
-  if (::dup2(streams.output, STDOUT_FILENO) < 0 || ::dup2(streams.output, STDERR_FILENO) < 0) return;
+  const int error = streams.error >= 0 ? streams.error : streams.output;
+  if (::dup2(streams.output, STDOUT_FILENO) < 0 || ::dup2(error, STDERR_FILENO) < 0) return;
   // The bus opens its sockets without CLOEXEC: a child would keep the ports of the link from a participant that is made
   // again, and could read what is sent to this process. Best effort: without it (before Linux 5.11) the child works.
   (void)::close_range(STDERR_FILENO + 1, ~0u, CLOSE_RANGE_CLOEXEC);

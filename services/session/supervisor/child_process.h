@@ -22,6 +22,7 @@ class ShortageError : public InputError {
 struct ChildStreams {
   int input = -1;  ///< -1: empty input.
   int output = -1;
+  int error = -1;  ///< -1: that of the output.
 };
 
 /// Whether a child ends with its parent, also when the parent is killed.

@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "services/session/console/http_server.h"
+#include "services/session/console/socket.h"
 #include "tests/fuzz/console/route_check.h"
 #include "tests/fuzz/target.h"
 
@@ -117,6 +118,7 @@ class ConsoleHttp final : public Target {
             "Upgrade: websocket",
             "Sec-WebSocket-Key: ",
             "/live?ticket=",
+            "/film?ticket=",
             "/api/",
             "/report?ticket=",
             "localhost"};
@@ -150,10 +152,13 @@ class ConsoleHttp final : public Target {
     if (!result.routed) return result.refusal;
     console::HttpResponse response = console::Done("taken");
     response.stream = result.routed->wanted == console::Wanted::kEvents;
-    response.socket = result.routed->wanted == console::Wanted::kLive;
+    const bool socket =
+        result.routed->wanted == console::Wanted::kLive || result.routed->wanted == console::Wanted::kFilm;
+    response.socket = socket ? &sockets_ : nullptr;
     return response;
   }
 
+  const console::SocketService sockets_{};
   const console::Access access_{console::testing::kToken, {"cart"}};
   console::HttpServer server_{{"127.0.0.1", 0, {}},
                               {[this](const console::HttpRequest& request) { return Answer(request); },

@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "services/session/console/socket.h"
 #include "tests/support/cart.h"
 #include "tests/support/http_client.h"
 
@@ -33,19 +34,12 @@ class Served {
   explicit Served(const HttpLimits& limits, std::optional<TlsIdentity> tls = {})
       : server_({.address = "127.0.0.1", .port = 0, .tls = std::move(tls)},
                 {.handle =
-                     [](const HttpRequest& request) {
+                     [this](const HttpRequest& request) {
                        return HttpResponse{.body = request.secure ? "secure" : "plain",
                                            .stream = request.target == "/stream",
-                                           .socket = request.target == "/socket"};
+                                           .socket = request.target == "/socket" ? &service_ : nullptr};
                      },
-                 .knows = [](const HttpRequest& request) { return request.authorization == "yes"; },
-                 .sockets = {.opened =
-                                 [this](Socket* socket) {
-                                   ++sockets_;
-                                   socket->SendText("welcome");
-                                 },
-                             .received = [](Socket* socket, std::string_view text) { Answer(socket, text); },
-                             .closed = [this](Socket*) { --sockets_; }}},
+                 .knows = [](const HttpRequest& request) { return request.authorization == "yes"; }},
                 limits),
         thread_([this](const std::stop_token& stop) {
           while (!stop.stop_requested()) {
@@ -65,6 +59,13 @@ class Served {
   }
 
   std::atomic<int> sockets_{0};
+  const SocketService service_{.opened =
+                                   [this](Socket* socket) {
+                                     ++sockets_;
+                                     socket->SendText("welcome");
+                                   },
+                               .received = [](Socket* socket, std::string_view text) { Answer(socket, text); },
+                               .closed = [this](Socket*) { --sockets_; }};
   HttpServer server_;
   std::jthread thread_;
 };

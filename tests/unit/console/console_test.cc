@@ -9,6 +9,7 @@
 #include <string>
 
 #include "services/base/core/error.h"
+#include "services/base/core/tick.h"
 #include "services/session/console/access.h"
 #include "services/session/console/advice.h"
 #include "services/session/console/form.h"
@@ -188,17 +189,33 @@ TEST(Router, FieldsAreCheckedByTheTable) {
   EXPECT_EQ(StatusOf(Post("/api/start", "scene=small&hands=mouse")), 400);
 }
 
-TEST(Router, TheLivePictureNeedsATicketAndThisPage) {
-  EXPECT_EQ(StatusOf(Get("/live")), 400);
-  EXPECT_EQ(StatusOf(Get("/live?ticket=1")), 400);
-  HttpRequest request = Get("/live?ticket=" + std::string(64, 'a'));
-  request.authorization.clear();  // A browser sends none with a WebSocket.
-  EXPECT_EQ(StatusOf(request), 200);
-  request.origin = "http://evil.example";
-  EXPECT_EQ(StatusOf(request), 403);
-  request.origin.clear();
-  request.fetch_site = "cross-site";
-  EXPECT_EQ(StatusOf(request), 403);
+TEST(Router, AWebSocketNeedsATicketAndThisPage) {
+  for (const std::string path : {"/live", "/film"}) {
+    SCOPED_TRACE(path);
+    EXPECT_EQ(StatusOf(Get(path)), 400);
+    EXPECT_EQ(StatusOf(Get(path + "?ticket=1")), 400);
+    HttpRequest request = Get(path + "?ticket=" + std::string(64, 'a'));
+    request.authorization.clear();  // A browser sends none with a WebSocket.
+    EXPECT_EQ(StatusOf(request), 200);
+    request.origin = "http://evil.example";
+    EXPECT_EQ(StatusOf(request), 403);
+    request.origin.clear();
+    request.fetch_site = "cross-site";
+    EXPECT_EQ(StatusOf(request), 403);
+  }
+}
+
+TEST(Tickets, AreValidOnceAndForAMinute) {
+  Tickets tickets;
+  const std::string first = tickets.Issue(0), second = tickets.Issue(kSecond_ns);
+  EXPECT_FALSE(tickets.Use("", 0));
+  EXPECT_FALSE(tickets.Use(std::string(64, 'a'), 0));
+  EXPECT_TRUE(tickets.Use(second, 2 * kSecond_ns));
+  EXPECT_FALSE(tickets.Use(second, 2 * kSecond_ns)) << "once";
+  EXPECT_FALSE(tickets.Use(first, 60 * kSecond_ns)) << "a minute";
+  const std::string old = tickets.Issue(0);
+  for (std::size_t i = 0; i < Tickets::kMost; ++i) EXPECT_NE(tickets.Issue(0), old);
+  EXPECT_FALSE(tickets.Use(old, 1)) << "the oldest of too many";
 }
 
 TEST(Router, MethodsAndBodies) {

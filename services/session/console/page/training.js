@@ -64,8 +64,8 @@ const training = (() => {
 
   async function start(exercise, trainee) {
     const byHand = trainee === 'me';
-    // Five pictures a second are kept, for the replay of the attempt.
-    const fields = {scene: exercise.scene, record: 'on', hands: byHand ? 'on' : 'off', trainee, picture_rate: 5};
+    // The replay of the attempt draws its recording.
+    const fields = {scene: exercise.scene, record: 'on', hands: byHand ? 'on' : 'off', trainee};
     if (await order('/api/start', fields, byHand ? 'Take the controls when the picture comes, and press Stop when you have finished.' : 'The script shows how it is done.')) ran = byHand ? exercise.scene : '';
   }
 
@@ -80,7 +80,6 @@ const training = (() => {
   // ---------------------------------------------------------------------------------------------- one attempt
 
   let films = [], time = 0, playing = 0, opened = '';
-  const timeOf = name => Number(name.match(/\d+/)[0]) / 1000;
 
   async function open(attempt) {
     const answer = await call(`/api/attempt?session=${attempt.session}`).then(r => r.json()).catch(() => null);
@@ -96,42 +95,30 @@ const training = (() => {
       rows.push(row);
     }
     $('sheet').replaceChildren(...rows);
-    films = [{canvas: $('film-own'), session: attempt.session, names: answer.pictures},
-      {canvas: $('film-expert'), session: answer.expert, names: answer.expert_pictures}].map(f => ({...f, times: f.names.map(timeOf), pictures: new Map(), drawn: ''}));
-    $('film-expert-box').hidden = !films[1].names.length;
-    $('screens').hidden = !films[0].names.length;
-    $('scrub').max = Math.max(0, ...films.flatMap(f => f.times.slice(-1)));
+    $('film-expert-box').hidden = !answer.expert;
+    $('scrub').max = 0;
+    $('play').disabled = true;
     opened = attempt.session;
+    films = [['own', attempt.session], ['expert', answer.expert]].filter(([, session]) => session).map(([side, session]) =>
+      openFilm(session, $(`film-${side}`), $(`film-${side}-note`), end => { lengthen(end); $('play').disabled = false; }));
     setTime(0);
     $('attempt-box').showModal();
-    timeline.open(attempt.session, answer.expert, t => { play(false); setTime(t); });
+    // Events may be known before the recordings' ends.
+    timeline.open(attempt.session, answer.expert, t => { play(false); lengthen(t); setTime(t); });
   }
 
-  async function drawFilm(film) {
-    let i = film.times.findIndex(t => t > time + 1e-6);
-    i = i < 0 ? film.names.length - 1 : Math.max(0, i - 1);
-    const name = film.names[i];
-    if (!name || name === film.drawn) return;
-    film.drawn = name;
-    if (!film.pictures.has(name)) {
-      const bytes = await call(`/api/attempt/picture?session=${film.session}&name=${name}`).then(r => r.ok ? r.blob() : null).catch(() => null);
-      if (!bytes) return;
-      film.pictures.set(name, await createImageBitmap(bytes));
-      // Two minutes of them; the oldest goes first.
-      if (film.pictures.size > 600) film.pictures.delete(film.pictures.keys().next().value);
-    }
-    const picture = film.pictures.get(name);
-    if (film.drawn !== name) return;
-    film.canvas.width = picture.width;
-    film.canvas.height = picture.height;
-    film.canvas.getContext('2d').drawImage(picture, 0, 0);
-    film.canvas.dataset.name = name;
+  /** The slider's way contains a time. */
+  function lengthen(end) {
+    if (end <= Number($('scrub').max)) return;
+    $('scrub').max = Math.ceil(20 * end) / 20;  // A whole number of the slider's steps.
+    timeline.draw();
   }
+
   function setTime(seconds) {
     time = Math.min(Number($('scrub').max), Math.max(0, seconds));
     $('scrub').value = time;
     setText($('scrub-time'), `${time.toFixed(1)} s`);
-    for (const film of films) drawFilm(film);
+    for (const film of films) film.show(time);
     timeline.at(time);
   }
   function play(on) {
@@ -146,7 +133,7 @@ const training = (() => {
       setTime(time + Number($('speed').value) * (now - last) / 1000);
       last = now;
       if (time >= Number($('scrub').max)) play(false);
-    }, 50);
+    }, 25);
   }
 
   document.addEventListener('DOMContentLoaded', () => {
@@ -154,6 +141,7 @@ const training = (() => {
     $('scrub').addEventListener('input', () => { play(false); setTime(Number($('scrub').value)); });
     $('attempt-box').addEventListener('close', () => {
       play(false);
+      for (const film of films) film.close();
       films = [];
       timeline.close();
       // The button that opened it may be gone; the keyboard goes on at the attempt.

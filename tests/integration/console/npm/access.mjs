@@ -111,6 +111,7 @@ async function byKeyboard({address, newPage}) {
   await page.waitForSelector('#attempt-box[open]', {timeout: 40_000});
   await until(page, 20, shown, 'own');
   await until(page, 20, shown, 'expert');
+  await until(page, 20, () => document.getElementById('film-own').dataset.time && document.getElementById('film-expert').dataset.time);
   await look(page, 'attempt', folder);
   expect((await page.textContent('#own-events')).includes('Pedal cut'), 'the pedal is on the time line');
   for (const what of ['Pedal coag', 'Hook (tool 2) touches', 'Blanching']) expect((await page.textContent('#expert-events')).includes(what), `${what} is among the events of the demonstration`);
@@ -129,7 +130,7 @@ async function byKeyboard({address, newPage}) {
   await tabTo(page, 'play', 'Shift+Tab');
   await keyboard.press('Enter');
   await rest(600);
-  expect(await scrubTime(page) > at, 'Play plays');
+  expect(await scrubTime(page) > at, `Play plays from ${at} s, but the slider is at ${await scrubTime(page)} s`);
   await keyboard.press('Escape');
   await until(page, 5, () => document.activeElement.dataset.session);
 
@@ -191,11 +192,11 @@ async function byTouch({address, newPage}) {
   const pedal = page.locator('#own-events button', {hasText: 'Pedal coag'}).first();
   const at = parseFloat(await pedal.textContent());
   await pedal.tap();
-  expect(Math.abs(await scrubTime(page) - at) <= 0.06, 'a tap jumps to the event');
+  expect(Math.abs(await scrubTime(page) - at) <= 0.06, `a tap jumps to the event at ${at} s, but to ${await scrubTime(page)} s`);
   await page.tap('#play');
   await rest(600);
   await page.tap('#play');
-  expect(await scrubTime(page) > at, 'Play plays');
+  expect(await scrubTime(page) > at, `Play plays from ${at} s, but the slider is at ${await scrubTime(page)} s`);
   // A tap on the lane jumps to the nearest mark.
   const lane = await page.locator('#own-lane').boundingBox(), mark = await page.locator('#own-lane .sign').first().boundingBox();
   await page.touchscreen.tap(mark.x + mark.width / 2, lane.y + lane.height / 2);

@@ -58,15 +58,28 @@ try {
     // The attempt opens by itself: sheet, picture and demonstration.
     await page.waitForSelector('#attempt-box[open]', {timeout: 40_000});
     expect(await page.locator('#sheet tr').count() >= 5, 'a sheet of scored measures');
-    await until(page, 5, () => document.getElementById('film-own').dataset.name && document.getElementById('film-expert').dataset.name);
-    const first = await page.evaluate(() => document.getElementById('film-own').dataset.name);
-    await page.selectOption('#speed', '4');
-    await page.click('#play');
-    await until(page, 10, name => document.getElementById('film-own').dataset.name !== name, first);
-    await page.click('#play');
-    await page.evaluate(() => { const s = document.getElementById('scrub'); s.value = 0.6 * s.max; s.dispatchEvent(new Event('input')); });
-    await until(page, 5, name => document.getElementById('film-own').dataset.name > name, first);
-    await new Promise(done => setTimeout(done, 500));
+    // Both recordings are drawn anew, for any time and at any speed.
+    const shows = t => ['own', 'expert'].every(side => Math.abs(Number(document.getElementById(`film-${side}`).dataset.time) - t) < 0.06);
+    const seen = () => page.evaluate(() => ['own', 'expert'].map(side => Number(document.getElementById(`film-${side}`).dataset.pictures || 0)));
+    const jump = t => page.evaluate(to => { const s = document.getElementById('scrub'); s.value = to; s.dispatchEvent(new Event('input')); }, t);
+    await until(page, 20, shows, 0);
+    expect(await page.evaluate(() => Number(document.getElementById('scrub').max)) > 4, 'the slider is as long as the recordings');
+    for (const speed of ['0.25', '4']) {
+      const [own, expert] = await seen(), from = await page.evaluate(() => Number(document.getElementById('scrub').value));
+      await page.selectOption('#speed', speed);
+      await page.click('#play');
+      await new Promise(done => setTimeout(done, 1000));
+      await page.click('#play');
+      const [own_now, expert_now] = await seen(), way = await page.evaluate(() => Number(document.getElementById('scrub').value)) - from;
+      expect(way > 0.6 * speed && way < 2 * speed, `a second at the speed ${speed} shows as much, but ${way} s`);
+      console.log(`a second of the replay at the speed ${speed}: ${own_now - own} and ${expert_now - expert} pictures`);
+      expect(own_now > own + 2 && expert_now > expert + 2, `pictures at the speed ${speed}: ${own_now - own}, ${expert_now - expert}`);
+    }
+    for (const t of [1, 3]) {
+      await jump(t);
+      await until(page, 20, shows, t);
+    }
+    expect(await page.evaluate(() => document.getElementById('film-own-note').textContent) === '', 'no trouble with the recording');
     await shot('attempt');
     await page.click('#attempt-close');
     expect(await page.locator('#attempts li button').count() === 1, 'one attempt');
