@@ -94,7 +94,7 @@ LinkFaults FaultsAt(const config::SimulatedUnit& unit, double session_time_s) {
 SimulatedInput FollowScript(const SceneView& scene, const config::CartConfig& cart, double session_time_s) {
   SimulatedInput input;
   for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
-    const bool stays = scene.tools[tool].traction_N > 0 && cart.handles[tool].kind == config::LinkKind::kOperator;
+    const bool stays = scene.tools[tool].assists() && cart.handles[tool].kind == config::LinkKind::kOperator;
     const double time_s = stays ? std::min(session_time_s, LastHoldOf(scene.script, tool)) : session_time_s;
     const ScriptPoint point = EvaluateScript(scene.script, tool, time_s);
     input.jaw_deg[tool] = kDegPerRad * point.jaw_rad;
@@ -107,7 +107,7 @@ SimulatedInput FollowScript(const SceneView& scene, const config::CartConfig& ca
 
 OperatedHands::OperatedHands(const config::CartConfig& cart, const SceneView& scene) : cart_(cart) {
   std::transform(scene.tools.begin(), scene.tools.end(), assists_.begin(),
-                 [](const ToolDescription& tool) { return tool.traction_N > 0; });
+                 [](const ToolDescription& tool) { return tool.assists(); });
   // The jaw of a scope is its zoom ring: wide.
   std::transform(scene.tools.begin(), scene.tools.end(), jaw_deg_.begin(),
                  [](const ToolDescription& tool) { return tool.kind == ToolKind::kScope ? 0 : kStartJaw_deg; });

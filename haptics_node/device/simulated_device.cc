@@ -13,7 +13,6 @@ constexpr double kSessionJump_s = 0.05;
 constexpr double kPull_m_per_Ns = 0.05, kFastestPull_m_s = 0.010;
 constexpr double kFarthestPull_m = 0.025;  // From the script.
 constexpr double kLetGo_s = 0.3;           // Time constant of the way back to the script.
-constexpr float kHolds_rad = 0.2f;         // Jaw angle below which it holds.
 constexpr double kFeels_N = 0.02;          // A smaller force has no direction.
 
 }  // namespace
@@ -41,7 +40,7 @@ void SimulatedDevice::Pull(double elapsed_s) noexcept {
   if (!(traction_N_ > 0)) return;
   const Vec3d f_T = ForceAtTip(PoseFromAttachPoint(trocar_, hand_.position()), sent_);
   const double force_N = f_T.norm();
-  if (point_.jaw_rad > kHolds_rad) {
+  if (point_.jaw_rad > kJawCloses_rad) {
     offset_ *= std::exp(-elapsed_s / kLetGo_s);
   } else if (force_N > kFeels_N) {
     const double speed = std::clamp(kPull_m_per_Ns * (traction_N_ - force_N), -kFastestPull_m_s, kFastestPull_m_s);

@@ -106,7 +106,7 @@ CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& sce
     if (!used[i]) continue;
     const Trocar trocar{scene.tools[i].p_WP.cast<double>(), scene.tools[i].shaft_length_m};
     // No person operates an assistant.
-    const bool assists = scene.tools[i].traction_N > 0 && device.kind == DeviceKind::kOperator;
+    const bool assists = scene.tools[i].assists() && device.kind == DeviceKind::kOperator;
     switch (assists ? DeviceKind::kSimulated : device.kind) {
       case DeviceKind::kNone:
         break;

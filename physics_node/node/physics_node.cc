@@ -33,15 +33,6 @@ constexpr float kMaxJaw_rad = 1.6f;
 /// Share of the limit from which on a force counts as limited, where the low-pass filter only approaches it.
 constexpr float kFilteredCapShare = 0.99f;
 
-std::uint32_t FindHook(const SceneView& scene) {
-  for (std::uint32_t i = 0; i < kMaxTools; ++i) {
-    if (scene.tools[i].kind == ToolKind::kHook) {
-      return i;
-    }
-  }
-  return kMaxTools;
-}
-
 }  // namespace
 
 PhysicsNode::PhysicsNode(const SceneView& scene, const Ports& ports, runtime::CheckpointFile* checkpoint,
@@ -50,7 +41,7 @@ PhysicsNode::PhysicsNode(const SceneView& scene, const Ports& ports, runtime::Ch
       ports_(ports),
       checkpoint_(checkpoint),
       simulation_(scene, threads),
-      hook_(FindHook(scene)),
+      hook_(static_cast<std::uint32_t>(FindTool(scene.tools, ToolKind::kHook).value_or(kMaxTools))),
       stampers_(epoch_ns) {
   for (ToolInput& input : inputs_) {
     // Until the first HandleState, between the angles for closing and opening: jaws neither grasp nor release.

@@ -282,7 +282,7 @@ HandsView RenderNode::ViewNow() const {
   hands.forward = -view.row(2).head<3>().transpose();
   hands.pixel = 2.0f * std::tan(0.5f * kRadPerDeg * camera.fov_deg) / static_cast<float>(shape_.height);
   for (std::size_t i = 0; i < kMaxTools; ++i) {
-    hands.present[i] = tools_.tools[i].kind != ToolKind::kNone && !(scene_.tools[i].traction_N > 0);
+    hands.present[i] = tools_.tools[i].kind != ToolKind::kNone && !scene_.tools[i].assists();
     hands.scope[i] = tools_.tools[i].kind == ToolKind::kScope;
     hands.tip[i] = tools_.tools[i].p_WT;
     hands.force_N[i] = tools_.tools[i].f_W.norm();

@@ -2,7 +2,6 @@
 
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <future>
 
@@ -35,8 +34,7 @@ void WarmUp(const SceneView& scene, Stage* stage) {
   view.SetScale(kFewPixels);
   Bitmap picture;
   stage->display->DrawAndRead(&picture);
-  if (std::any_of(scene.tools.begin(), scene.tools.end(),
-                  [](const ToolDescription& tool) { return tool.kind == ToolKind::kScope; })) {
+  if (FindTool(scene.tools, ToolKind::kScope)) {
     view.SetSoil(1);
     stage->display->DrawAndRead(&picture);
     view.SetSoil(0);

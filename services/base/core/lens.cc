@@ -16,12 +16,8 @@ constexpr double kLongestGap_s = 0.1;  // A gap in the samples is no time at the
 
 }  // namespace
 
-Lens::Lens(const SceneView& scene) : scene_(scene) {
-  for (std::size_t i = 0; i < kMaxTools; ++i) {
-    if (scene.tools[i].kind == ToolKind::kScope) scope_ = i;
-    if (scene.tools[i].kind == ToolKind::kHook) hook_ = i;
-  }
-}
+Lens::Lens(const SceneView& scene)
+    : scene_(scene), scope_(FindTool(scene.tools, ToolKind::kScope)), hook_(FindTool(scene.tools, ToolKind::kHook)) {}
 
 bool Lens::Touches(const Vec3f& lens_W) const {
   return std::any_of(scene_.rest_position.begin(), scene_.rest_position.end(),

@@ -45,13 +45,15 @@ struct ScriptPoint {
           a.power_W, between(a.roll_rad, next->roll_rad)};
 }
 
+/// Angle of a scripted jaw below which it is closed [rad].
+inline constexpr float kJawCloses_rad = 0.2f;
+
 /// Session time of the last key at which the tool's jaw is closed; infinite if it never is. Where a person operates the
 /// other tools, an assistant does not let go by the clock: its script stands still from then on.
 [[nodiscard]] inline double LastHoldOf(std::span<const ScriptKey> script, std::uint32_t tool) {
-  constexpr float kClosed_rad = 0.2f;
   double last_s = std::numeric_limits<double>::infinity();
   for (const ScriptKey& key : script) {
-    if (key.tool == tool && key.jaw_rad < kClosed_rad) last_s = static_cast<double>(key.time_s);
+    if (key.tool == tool && key.jaw_rad < kJawCloses_rad) last_s = static_cast<double>(key.time_s);
   }
   return last_s;
 }

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "services/base/core/assessment.h"
@@ -186,7 +188,17 @@ struct ToolDescription {
   /// An assistant: no person operates this tool, and its scripted hand keeps this force of the tissue while its jaws
   /// are closed [N]. 0: none.
   float traction_N = 0;
+
+  [[nodiscard]] bool assists() const { return traction_N > 0; }
 };
+
+/// The first tool of a kind.
+[[nodiscard]] inline std::optional<std::size_t> FindTool(std::span<const ToolDescription> tools, ToolKind kind) {
+  for (std::size_t i = 0; i < tools.size(); ++i) {
+    if (tools[i].kind == kind) return i;
+  }
+  return std::nullopt;
+}
 
 /// Part of an instrument that a mesh represents: everything that does not turn, or the jaw that opens towards +x or -x.
 enum class ToolPart : std::uint32_t { kBody, kJawPlus, kJawMinus };

@@ -87,10 +87,9 @@ double VaporisingHeat_J_m(const ThermalParams& thermal, float width_m) {
 class Reader {
  public:
   Reader(const SceneView& scene, const ContactReach& reach) : sheet_(scene) {
-    while (tool_ < scene.tools.size() && scene.tools[tool_].kind != ToolKind::kHook) ++tool_;
-    if (tool_ == scene.tools.size()) {
-      throw InputError(std::string("scene \"") + scene.name + "\" has no hook: nothing in it can cut");
-    }
+    const std::optional<std::size_t> hook = FindTool(scene.tools, ToolKind::kHook);
+    if (!hook) throw InputError(std::string("scene \"") + scene.name + "\" has no hook: nothing in it can cut");
+    tool_ = *hook;
     const ToolDescription& tool = scene.tools[tool_];
     axis_ = MetalAxis(tool);
     const float margin_m = scene.physics.collision_margin_m;

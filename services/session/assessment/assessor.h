@@ -62,7 +62,7 @@ class Assessor {
   /// Measures the waiting contacts whose pedal state is known, or all of them.
   void MeasureContacts(bool all);
   [[nodiscard]] MeasureValues ToolFigures(int i) const;
-  [[nodiscard]] bool Assists(std::size_t tool) const { return scene_.tools[tool].traction_N > 0; }
+  [[nodiscard]] bool Assists(std::size_t tool) const { return scene_.tools[tool].assists(); }
   void SetOfMotion(MeasureValues* session) const;
   void SetOfHook(MeasureValues* session) const;
   void SetOfScope(MeasureValues* session) const;

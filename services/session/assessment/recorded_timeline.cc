@@ -6,6 +6,8 @@
 
 #include "services/base/core/error.h"
 #include "services/records/log_tools/recording.h"
+#include "services/records/recording/recorded_scene.h"
+#include "services/scene/format/scene_file.h"
 #include "services/transport/bus/gate.h"
 #include "services/transport/bus/input_account.h"
 
@@ -32,7 +34,9 @@ std::int64_t StartOf(const std::filesystem::path& file) {
 }  // namespace
 
 RecordedTimeline ReadTimeline(const std::filesystem::path& file, const std::stop_token& stop) {
-  Timeline timeline(StartOf(file));
+  const std::filesystem::path beside = recording::BesideRecording("", file, "scene.fulcrum");
+  const std::optional<scene::SceneFile> scene = beside.empty() ? std::nullopt : std::optional<scene::SceneFile>(beside);
+  Timeline timeline(StartOf(file), scene ? &scene->view() : nullptr);
   log_tools::Recording recording(file, {.topics = {"ToolState", "ContactModel", "HandleState", "ThermalEvent"}});
   std::map<TopicId, bus::InputAccount> accounts;  // Skips the samples of a process that has been replaced.
   log_tools::Entry entry;

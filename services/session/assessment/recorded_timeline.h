@@ -14,7 +14,8 @@ struct RecordedTimeline {
   std::size_t left_out = 0;  ///< Number of those beyond Timeline::kMost.
 };
 
-/// Reads the first session of a recording, up to `stop`. Throws InputError (no recording, no session in it).
+/// Reads the first session of a recording, up to `stop`; with forces and slips where the compiled scene is beside it.
+/// Throws InputError (no recording, no session in it).
 [[nodiscard]] RecordedTimeline ReadTimeline(const std::filesystem::path& recording, const std::stop_token& stop = {});
 
 }  // namespace fulcrum::assessment

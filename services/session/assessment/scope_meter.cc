@@ -16,12 +16,14 @@ constexpr float kMeets_m = 0.005f;
 
 }  // namespace
 
-ScopeMeter::ScopeMeter(const SceneView& scene) : scene_(scene), line_(scene), lens_(scene) {
-  for (std::size_t i = 0; i < kMaxTools; ++i) {
-    const ToolKind kind = scene.tools[i].kind;
-    if (kind == ToolKind::kScope) scope_ = i;
-    const bool first = TouchesTissue(kind) && !acting_;
-    if (first || (kind == ToolKind::kHook && scene.tools[*acting_].kind != ToolKind::kHook)) acting_ = i;
+ScopeMeter::ScopeMeter(const SceneView& scene)
+    : scene_(scene),
+      scope_(FindTool(scene.tools, ToolKind::kScope)),
+      acting_(FindTool(scene.tools, ToolKind::kHook)),
+      line_(scene),
+      lens_(scene) {
+  for (std::size_t i = 0; i < kMaxTools && !acting_; ++i) {
+    if (TouchesTissue(scene.tools[i].kind)) acting_ = i;
   }
 }
 

@@ -76,6 +76,10 @@ std::string TextOf(const Happening& happening) {
       return "Pedal coag";
     case HappeningKind::kPedalBlend:
       return "Pedal blend";
+    case HappeningKind::kForce:
+      return "Force too high";
+    case HappeningKind::kSlip:
+      return tool + " loses its hold";
     case HappeningKind::kThermal:
       return NamesOf(happening.thermal).text;
   }
@@ -96,10 +100,18 @@ const char* KeyOf(const Happening& happening) {
       return "pedal_coag";
     case HappeningKind::kPedalBlend:
       return "pedal_blend";
+    case HappeningKind::kForce:
+      return "force";
+    case HappeningKind::kSlip:
+      return "slip";
     case HappeningKind::kThermal:
       return NamesOf(happening.thermal).key;
   }
   return "unknown";
+}
+
+Timeline::Timeline(std::int64_t session_start_ns, const SceneView* scene) : start_ns_(session_start_ns) {
+  if (scene != nullptr) force_.emplace(scene->assessment, scene->physics);
 }
 
 std::size_t Timeline::Begin(const Happening& happening) {
@@ -137,6 +149,22 @@ void Timeline::Add(const ContactModel& model) {
     }
     if (holds != holds_[i]) happens(holds ? HappeningKind::kGrasp : HappeningKind::kRelease);
     holds_[i] = holds;
+  }
+  if (force_) AddForces(time_s, model);
+}
+
+void Timeline::AddForces(double time_s, const ContactModel& model) {
+  std::array<int, kMaxTools> slips{};
+  for (std::size_t i = 0; i < kMaxTools; ++i) slips[i] = force_->tool(static_cast<int>(i)).slips;
+  if (force_->Add(time_s, model).too_high) {
+    // Forces that fall below the limit for a moment are one.
+    const bool same = high_force_ < kMost && time_s - list_[high_force_].until_s < kSame_s;
+    if (!same) high_force_ = Begin({.time_s = time_s, .until_s = time_s, .kind = HappeningKind::kForce});
+    if (high_force_ < kMost) list_[high_force_].until_s = time_s;
+  }
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    if (force_->tool(static_cast<int>(i)).slips == slips[i]) continue;
+    (void)Begin({.time_s = time_s, .until_s = time_s, .kind = HappeningKind::kSlip, .tool = static_cast<int>(i)});
   }
 }
 

@@ -4,10 +4,13 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "services/base/core/messages.h"
+#include "services/base/core/scene_view.h"
+#include "services/session/assessment/force_meter.h"
 
 namespace fulcrum::assessment {
 
@@ -18,6 +21,8 @@ enum class HappeningKind : std::uint8_t {
   kPedalCut,  ///< A pedal is down.
   kPedalCoag,
   kPedalBlend,
+  kForce,    ///< The tissue's force on a tool is above the highest that the scene's exercise allows.
+  kSlip,     ///< Tissue slips out of closed jaws.
   kThermal,  ///< A ThermalEvent; `thermal` names it.
 };
 
@@ -25,7 +30,7 @@ struct Happening {
   double time_s = 0;   ///< Session time of the begin [s].
   double until_s = 0;  ///< Session time of the end [s]; `time_s` for what has no duration.
   HappeningKind kind = HappeningKind::kTouch;
-  int tool = 0;                                           ///< Of kTouch, kGrasp and kRelease.
+  int tool = 0;                                           ///< Of kTouch, kGrasp, kRelease and kSlip.
   ToolKind tool_kind = ToolKind::kNone;                   ///< Of the same.
   ThermalEventKind thermal = ThermalEventKind::kContact;  ///< Of kThermal.
 };
@@ -33,8 +38,8 @@ struct Happening {
 /// Short text for people, such as "Grasper (tool 1) grasps" or "Ureter warning".
 [[nodiscard]] std::string TextOf(const Happening& happening);
 /// Name of the kind in files and on the page: "touch", "grasp", "release", "pedal_cut", "pedal_coag", "pedal_blend",
-/// "current", "blanching", "steam", "cut", "charring", "ureter_warning", "ureter_injury", "nerve_warning",
-/// "nerve_injury", "region_reset".
+/// "force", "slip", "current", "blanching", "steam", "cut", "charring", "ureter_warning", "ureter_injury",
+/// "nerve_warning", "nerve_injury", "region_reset".
 [[nodiscard]] const char* KeyOf(const Happening& happening);
 
 /// Takes each message in the order of its writer. The order between topics does not matter.
@@ -44,7 +49,8 @@ class Timeline {
   static constexpr std::size_t kMost = 500;
 
   /// @param session_start_ns CLOCK_MONOTONIC at session time 0 [ns]; earlier messages do not count.
-  explicit Timeline(std::int64_t session_start_ns) : start_ns_(session_start_ns) {}
+  /// @param scene of the session; null: neither forces nor slips are judged.
+  explicit Timeline(std::int64_t session_start_ns, const SceneView* scene = nullptr);
 
   void Add(const ToolState& state);
   void Add(const ContactModel& model);
@@ -63,8 +69,11 @@ class Timeline {
   }
   /// Index of the new one; kMost when it is not kept.
   std::size_t Begin(const Happening& happening);
+  void AddForces(double time_s, const ContactModel& model);
 
   std::int64_t start_ns_;
+  std::optional<ForceMeter> force_;
+  std::size_t high_force_ = kMost;  ///< Index in `list_` of the newest.
   std::vector<Happening> list_;
   std::size_t left_out_ = 0;
   std::array<ToolKind, kMaxTools> kinds_{};

@@ -57,6 +57,23 @@ TEST(Timeline, EventsOfHeatThatRepeatAreOne) {
   EXPECT_EQ(TextOf(timeline.happenings()[1]), "Ureter warning");
 }
 
+TEST(Timeline, ForcesAboveTheLimitAndSlips) {
+  SceneView scene;
+  scene.assessment.limit[static_cast<std::size_t>(Measure::kPeakForce)] = 1.5f;
+  scene.physics.grip_force_N = 5;
+  Timeline timeline(test::kStart_ns, &scene);
+  for (int i = 0; i < 10; ++i) timeline.Add(test::PushAt(1 + 0.01 * i, i < 5 ? 2 : 1));
+  timeline.Add(test::PushAt(1.5, 2));  // Soon again: one.
+  timeline.Add(test::PushAt(4, 2));
+  for (const double time_s : {5.0, 5.01, 5.02}) timeline.Add(test::GraspAt(time_s, Vec3d::Zero(), 1, 5));
+  timeline.Add(test::PushAt(5.03, 1));  // Closed jaws hold no more.
+  timeline.Add(test::ToolAt(6, Vec3d::Zero(), Vec3d::Zero()));
+  EXPECT_EQ(
+      Told(timeline),
+      "1.0-1.0 touch; 1.0-1.5 force; 4.0-4.0 force; 5.0-5.0 touch; 5.0-5.0 grasp; 5.0-5.0 release; 5.0-5.0 slip; ");
+  EXPECT_EQ(TextOf(timeline.happenings().back()), "Grasper (tool 1) loses its hold");
+}
+
 TEST(Timeline, ItsLengthIsLimited) {
   Timeline timeline(test::kStart_ns);
   for (std::size_t i = 0; i < Timeline::kMost + 7; ++i) {

@@ -242,7 +242,7 @@ function showFigures(figures) {
   setText($('force-more'), `highest ${figures.peak_force_N.toFixed(2)} N · at the hand ${figures.hand_force_N.toFixed(2)} N`);
   drawPlot($('plot-temperature'), points, {span: kSpan, floor: 20, least: 60, unit: '°C', lines: heat ? [{at: 1, colour: '#ff8a5c'}] : []});
   drawPlot($('plot-force'), points, {span: kSpan, floor: 0, least: 0.5, unit: 'N',
-    lines: [{at: 2, colour: '#58bcff'}, {at: 3, colour: '#ffd866'}]});
+    lines: ['#58bcff', '#ffd866', '#5ce0a8', '#d9a8ff'].map((colour, i) => ({at: 2 + i, colour})).filter(({at}) => at < 4 || points.some(p => p[at] > 0))});
 }
 
 let pictureShown = '', pictureAsked = false;
