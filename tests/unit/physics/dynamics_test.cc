@@ -1,0 +1,94 @@
+// Figures of motion that follow from mechanics, in each mode: gravity, damping, weight against bending.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+#include "physics_node/simulation/tissue_simulation.h"
+#include "tests/unit/physics/sheet_scene.h"
+
+namespace fulcrum::physics {
+namespace {
+
+/// A sheet without tools, after some time.
+struct Fall {
+  TissueSimulation simulation;
+  explicit Fall(const SceneView& scene, double seconds) : simulation(scene) {
+    const std::array<ToolInput, kMaxTools> no_tools{};
+    const auto steps = std::lround(seconds / static_cast<double>(scene.physics.dt_s));
+    for (long i = 0; i < steps; ++i) (void)simulation.Step(no_tools);
+  }
+  [[nodiscard]] double z(Index particle) const {
+    return static_cast<double>(simulation.particles().At(simulation.particles().Ref(particle)).z());
+  }
+};
+
+class Falling : public testing::TestWithParam<PhysicsMode> {};
+
+/// Nothing holds the sheet: g / c (t - (1 - exp(-c t)) / c), whatever it is made of.
+TEST_P(Falling, AFreeSheetFallsAndIsDamped) {
+  constexpr Index kRows = 9;
+  scene::SceneData data = SheetScene(kRows, kRows);
+  for (float& inverse_mass : data.inverse_mass) inverse_mass = 1.0f / (0.5f * 0.002f * 0.002f);
+  SceneView scene = data.View();
+  scene.physics.mode = GetParam();
+  for (const double c : {2.0, 8.0}) {
+    constexpr double kG = 1, kTime_s = 0.2;
+    scene.physics.gravity = Vec3f(0, 0, -static_cast<float>(kG));
+    scene.physics.damping_per_s = static_cast<float>(c);
+    const Fall fall(scene, kTime_s);
+    const double expected = -kG / c * (kTime_s - (1 - std::exp(-c * kTime_s)) / c);
+    for (const Index particle : {Index{0}, kRows * kRows / 2, kRows * kRows - 1}) {
+      EXPECT_NEAR(fall.z(particle) / expected, 1, 0.08) << "damping " << c << " 1/s, particle " << particle;
+    }
+  }
+}
+
+// Not mode accurate, which is made for tissue that something holds (physics_node/DESIGN.md, Limits).
+INSTANTIATE_TEST_SUITE_P(Modes, Falling, testing::Values(PhysicsMode::kPaper, PhysicsMode::kXpbd));
+
+/// A square membrane that is held at its rim sags in the middle by 0.802 a (q a / (E t))^(1/3), a half its side, q its
+/// weight (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, article 102, for a Poisson's ratio of 0.25).
+TEST(Sagging, AHeldSheetSagsByItsWeight) {
+  constexpr Index kRows = 25;
+  constexpr double kHalf_m = 0.024, kG = 3.2, kWeight_Pa = 0.5 * kG;
+  const scene::SceneData data = SheetScene(kRows, kRows);
+  SceneView scene = data.View();
+  scene.physics.mode = PhysicsMode::kAccurate;
+  scene.physics.gravity = Vec3f(0, 0, -static_cast<float>(kG));
+  scene.physics.membrane_Et_N_per_m = 20;
+  scene.physics.membrane_prestrain = 0;
+  scene.physics.damping_per_s = 10;
+  const Fall fall(scene, 3);
+  const double expected = -0.802 * kHalf_m * std::cbrt(kWeight_Pa * kHalf_m / 20);
+  // The edges of the grid are a truss, not a continuum: 12 % too stiff here.
+  EXPECT_NEAR(fall.z(kRows * kRows / 2) / expected, 1, 0.15);
+}
+
+/// A strip that is clamped at one end sags as a plate does, q l^4 / (8 D); without stiffness against bending it would
+/// hang down.
+TEST(Bending, CarriesAStripsWeight) {
+  constexpr Index kRows = 13, kColumns = 25;
+  constexpr float kPitch_m = 0.002f;
+  scene::SceneData data = SheetScene(kRows, kColumns, kPitch_m);
+  for (Index r = 0; r < kRows; ++r) {
+    for (Index c = 0; c < kColumns; ++c) {
+      data.inverse_mass[r * kColumns + c] = c < 5 ? 0.0f : 1.0f / (0.5f * kPitch_m * kPitch_m);
+    }
+  }
+  SceneView scene = data.View();
+  scene.physics.mode = PhysicsMode::kAccurate;
+  scene.physics.gravity = Vec3f(0, 0, -0.02f);
+  scene.physics.damping_per_s = 10;
+  const double length_m = (kColumns - 5) * static_cast<double>(kPitch_m);
+  const double expected =
+      -0.5 * 0.02 * std::pow(length_m, 4) / (8 * static_cast<double>(scene.physics.membrane_bending_Nm));
+  const Fall fall(scene, 3);
+  const double sag = fall.z(kRows / 2 * kColumns + kColumns - 1);
+  // Only every second hinge of every second row exists in this scene. Without them it sags by more than ten times.
+  EXPECT_GT(sag / expected, 0.5);
+  EXPECT_LT(sag / expected, 4);
+}
+
+}  // namespace
+}  // namespace fulcrum::physics
