@@ -86,7 +86,8 @@ void WriteToken(const std::filesystem::path& file, const std::string& token) {
 
 std::string Tickets::Issue(std::int64_t now_ns) {
   if (tickets_.size() == kMost) tickets_.pop_front();
-  return tickets_.emplace_back(MakeToken(), now_ns + kTicketLife).text;
+  tickets_.push_back({MakeToken(), now_ns + kTicketLife});
+  return tickets_.back().text;
 }
 
 bool Tickets::Use(std::string_view ticket, std::int64_t now_ns) {
