@@ -108,7 +108,8 @@ class Finder {
     }
   }
 
-  /// A fifth more, a fifth less, none; of a whole number above 2, one more. Exponents are taken for units.
+  /// A fifth more, a fifth less, none; of a whole number above 2 in a line with constexpr, one more. Exponents are
+  /// taken for units.
   void Numbers() {
     static const std::regex kNumber(R"((^|[^\w.'])((\d[\d']*\.\d*|\d[\d']*)([eE][-+]?\d+)?)(f?)(?![\w.]))");
     for (std::sregex_iterator match(code_.begin(), code_.end(), kNumber), end; match != end; ++match) {
@@ -141,7 +142,7 @@ class Finder {
   /// A sum that is not added, a call that is not made.
   void Statements() {
     static const std::regex kSum(R"(\n *([\w.\[\]>()*-]+ [-+*]= [^;{}]*;))");
-    static const std::regex kCall(R"(\n *((?:[\w]+(?:\.|->))?[A-Z]\w*\([^;{}]*\);)\n)");
+    static const std::regex kCall(R"(\n *((?:[\w]+(?:\.|->))?[A-Z]\w*\([^;{}]*\);)(?=\n))");
     for (const auto& [pattern, kind] : {std::pair(&kSum, "term"), std::pair(&kCall, "call")}) {
       for (std::sregex_iterator match(code_.begin(), code_.end(), *pattern), end; match != end; ++match) {
         Add(static_cast<std::size_t>(match->position(1)), static_cast<std::size_t>(match->length(1)), kind, ";");

@@ -43,6 +43,10 @@ TEST(Faults, SumsAndCallsAreLeftOut) {
   EXPECT_EQ(Changed("void F() {\n  tile->Wake(3);\n}\n", "call"), std::set<std::string>{"void F() {\n  ;\n}\n"});
 }
 
+TEST(Faults, EachOfSeveralCalls) {
+  EXPECT_EQ(Changed("void F() {\n  A(1);\n  B(2);\n  C(3);\n}\n", "call").size(), 3u);
+}
+
 TEST(Faults, WhatIsNoCodeStays) {
   for (const char* source : {
            "// 2.5 + 3.5 < 4\n",
