@@ -98,6 +98,10 @@ void RenderNode::Step(const Tick& tick) {
   }
 }
 
+void RenderNode::FollowEffects() {
+  if (ready()) changed_on_screen_ |= view_.UpdateEffects(session_time_s_);
+}
+
 void RenderNode::Finish() {
   if (writer_.has_folder() && ready() && changed_in_file_) {
     Draw(session_time_s_, true);

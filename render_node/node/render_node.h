@@ -57,6 +57,10 @@ class RenderNode {
   /// each change; otherwise if a PNG is due and something has changed since the last one. Else nothing is computed.
   void Step(const Tick& tick);
 
+  /// Moves smoke and blood on to the time of the last Step, for steps that draw nothing: otherwise they make up at most
+  /// a second when the next picture is drawn. Call from the thread of Step.
+  void FollowEffects();
+
   /// Time between two steps. In a window the scene sets the wanted rate of pictures, the cart (`cart_ns`) the rate that
   /// the machine can reach, and the lower one is used. An operator's hand and readers of live pictures wait for theirs:
   /// then, and off screen, the cart's is used [ns].

@@ -3,6 +3,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <atomic>
 #include <charconv>
 #include <chrono>
 #include <cmath>
@@ -11,6 +12,7 @@
 #include <mutex>
 #include <optional>
 #include <ostream>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -49,21 +51,29 @@ class Screen final : public bus::LoanOutput<Picture> {
   [[nodiscard]] bus::OutputStats stats() const override { return {}; }
 
   /// Whether steps draw. From the thread of the steps.
-  void Want(bool wanted) { wanted_ = wanted; }
-  /// Waits for a picture that was drawn; empty if it could not be compressed.
+  void Want(bool wanted) {
+    const std::lock_guard lock(mutex_);
+    wanted_ = wanted;
+    full_ = false;
+  }
+  /// Waits for the picture that the last step has drawn. Valid until the next call. Throws std::runtime_error when it
+  /// does not come.
   [[nodiscard]] std::span<const std::uint8_t> Take() {
     std::unique_lock lock(mutex_);
-    if (!came_.wait_for(lock, kPatience, [this] { return full_; })) return {};
-    full_ = false;
-    return std::span(jpeg_).first(header_.size);
+    if (!came_.wait_for(lock, kPatience, [this] { return full_; })) {
+      throw std::runtime_error("the picture could not be compressed");
+    }
+    taken_.assign(jpeg_.begin(), jpeg_.begin() + header_.size);
+    return taken_;
   }
 
  private:
-  bool wanted_ = false, full_ = false;
+  std::atomic<bool> wanted_{false};
+  bool full_ = false;
   std::mutex mutex_;
   std::condition_variable came_;
   PictureHeader header_;
-  std::vector<std::uint8_t> jpeg_ = std::vector<std::uint8_t>(kMaxPictureBytes);
+  std::vector<std::uint8_t> jpeg_ = std::vector<std::uint8_t>(kMaxPictureBytes), taken_;
 };
 
 double EndOf(const std::filesystem::path& recording, std::int64_t start_ns) {
@@ -87,18 +97,32 @@ double TimeIn(const std::string& line) {
 struct Film::Impl {
   Impl(const std::filesystem::path& file, const SceneView& given) : recording(file), scene(given) {
     Begin();
-    if (Read()) end_s = EndOf(recording, replay->session_start_ns());
+    if (Read()) end_s = std::max(0.0, EndOf(recording, replay->session_start_ns()));
   }
 
   void Begin() {
     replay.reset();  // Two contexts of OpenGL at a time need twice the memory.
-    replay.emplace(recording, scene, render::RenderSettings{}, &screen);
+    render::RenderSettings settings;
+    settings.quality = render::Quality::kHigh;  // A picture that stands still is looked at.
+    replay.emplace(recording, scene, settings, &screen);
     shown_s = read_s = 0;
   }
   bool Read() {
     const std::optional<double> next_s = replay->Next();
     read_s = next_s.value_or(read_s);
     return next_s.has_value();
+  }
+
+  /// Hands over what was recorded up to a time, in steps that draw nothing; without the tissue before `tissue_from_s`.
+  void ReadTo(double time_s, double tissue_from_s) {
+    replay->SkipTissueBefore(tissue_from_s);
+    double due_s = shown_s + kStep_s;
+    while (read_s < time_s && Read()) {
+      if (read_s < due_s || read_s >= time_s) continue;
+      replay->Step(read_s);
+      replay->node().FollowEffects();
+      due_s = read_s + kStep_s;
+    }
   }
 
   const std::filesystem::path recording;
@@ -121,21 +145,22 @@ std::span<const std::uint8_t> Film::At(double time_s) {
   Impl& film = *impl_;
   time_s = std::clamp(time_s, 0.0, film.end_s);
   if (time_s < film.shown_s) film.Begin();
-  film.replay->SkipTissueBefore(time_s > film.shown_s + kJump_s ? time_s - kJump_s / 2 : 0);
   film.screen.Want(false);
-  double due_s = film.shown_s + kStep_s;
-  while (film.read_s < time_s && film.Read()) {
-    if (film.read_s < due_s || film.read_s >= time_s) continue;
-    film.replay->Step(film.read_s);
-    due_s = film.read_s + kStep_s;
+  if (time_s > film.shown_s + kJump_s) {
+    const std::uint64_t tissue = film.replay->tissue_frames();
+    film.ReadTo(time_s, time_s - kJump_s / 2);
+    // The tissue is older where nothing was published for a while.
+    if (film.replay->tissue_frames() == tissue) film.Begin();
   }
+  film.ReadTo(time_s, 0);
   film.screen.Want(true);
   film.shown_s = time_s;
-  const std::uint64_t drawn = film.replay->node().pictures_drawn();
+  render::RenderNode& node = film.replay->node();
+  const std::uint64_t drawn = node.pictures_drawn();
   film.replay->Step(time_s);
   // Before the first tissue there is nothing to draw: the first picture is shown in its place.
-  while (film.replay->node().pictures_drawn() == 0 && film.Read()) film.replay->Step(std::max(time_s, film.read_s));
-  return film.replay->node().pictures_drawn() == drawn ? std::span<const std::uint8_t>() : film.screen.Take();
+  while (node.pictures_drawn() == 0 && film.Read()) film.replay->Step(std::max(time_s, film.read_s));
+  return node.pictures_drawn() == drawn ? std::span<const std::uint8_t>() : film.screen.Take();
 }
 
 void ShowFilm(const std::filesystem::path& recording, const SceneView& scene, std::istream& in, std::ostream& out) {

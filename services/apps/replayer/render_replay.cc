@@ -26,15 +26,18 @@ class Feed {
     if (bus::DecodeCdr(bytes, &message_)) {
       out_->Write(message_);
       *stamp_ns = std::max(*stamp_ns, bus::StampOf(message_).stamp_ns);
+      ++count_;
     }
     return true;
   }
+  [[nodiscard]] std::uint64_t count() const { return count_; }
 
  private:
   bus::InProcessTopic<T> topic_;
   std::unique_ptr<bus::Input<T>> in_ = topic_.MakeInput();
   std::unique_ptr<typename bus::OutputOf<T>::type> out_ = topic_.MakeOutput();
   T message_;
+  std::uint64_t count_ = 0;
 };
 
 using Feeds =
@@ -115,6 +118,8 @@ std::optional<double> RenderReplay::Next() {
   }
   return std::nullopt;
 }
+
+std::uint64_t RenderReplay::tissue_frames() const { return std::get<Feed<TissueFrame>>(impl_->feeds).count(); }
 
 void RenderReplay::Step(double time_s) {
   Tick& tick = impl_->tick;

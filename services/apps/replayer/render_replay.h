@@ -31,6 +31,9 @@ class RenderReplay {
   /// From now on leaves out TissueFrames that were recorded before a session time: reading is several times as fast.
   void SkipTissueBefore(double time_s);
 
+  /// Number of TissueFrames that were handed over.
+  [[nodiscard]] std::uint64_t tissue_frames() const;
+
   /// One step of the node with the messages handed over so far.
   void Step(double time_s);
 

@@ -1,4 +1,4 @@
-// Access control of the console. Pure except for the functions on the token file.
+// Access control of the console.
 #pragma once
 
 #include <cstddef>

@@ -85,12 +85,13 @@ class Reader {
   std::string held_;
 };
 
-/// The reason that a program has printed as "replayer: reason"; empty: none.
+/// The reason that a program has printed last as "replayer: reason"; empty: none.
 std::string Reason(int log) {
-  std::array<char, 8192> bytes{};
-  const ssize_t got = ::pread(log, bytes.data(), bytes.size(), 0);
-  const std::string text(bytes.data(), static_cast<std::size_t>(std::max<ssize_t>(0, got)));
   constexpr std::string_view kBegin = "replayer: ";
+  std::array<char, 8192> bytes{};
+  const off_t size = ::lseek(log, 0, SEEK_END);
+  const ssize_t got = ::pread(log, bytes.data(), bytes.size(), std::max<off_t>(0, size - off_t{bytes.size()}));
+  const std::string text(bytes.data(), static_cast<std::size_t>(std::max<ssize_t>(0, got)));
   const std::size_t at = text.rfind(kBegin);
   if (at == std::string::npos) return {};
   const std::size_t begin = at + kBegin.size();
@@ -124,9 +125,9 @@ class AttemptFilms::Projector {
     ours_ = Descriptor(pair[0]);
     const Descriptor theirs(pair[1]);
     log_ = Descriptor(::memfd_create("film", MFD_CLOEXEC));
-    process_ = supervisor::ChildProcess::StartOn(
-        replayer, {recording.string(), "--film"},
-        {.input = theirs.get(), .output = theirs.get(), .error = log_.get() >= 0 ? log_.get() : -1});
+    if (log_.get() < 0) throw InputError(std::string("no memory for the film's messages: ") + ::strerror(errno));
+    process_ = supervisor::ChildProcess::StartOn(replayer, {recording.string(), "--film"},
+                                                 {.input = theirs.get(), .output = theirs.get(), .error = log_.get()});
     thread_ = std::jthread([from = ours_.get(), take = std::move(take)] { Forward(from, take); });
   }
   ~Projector() {
@@ -167,6 +168,13 @@ AttemptFilms::AttemptFilms(fs::path replayer, FolderOf folder_of, Post post)
 AttemptFilms::~AttemptFilms() = default;
 
 void AttemptFilms::End() { films_.clear(); }
+
+void AttemptFilms::Stop(const std::string& why) {
+  for (auto& [page, film] : films_) {
+    if (film) page->SendText(Trouble(why));
+    film.reset();
+  }
+}
 
 void AttemptFilms::Open(Socket* page) { films_[page]; }
 

@@ -38,6 +38,9 @@ class AttemptFilms {
   /// Ends all films. Call before what `post` uses ends.
   void End();
 
+  /// Ends all films and tells their pages why.
+  void Stop(const std::string& why);
+
   void Open(Socket* page);
   void Close(Socket* page);
   /// A message that is malformed has no effect. Call from the main thread, because the process ends with it.

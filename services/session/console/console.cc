@@ -194,8 +194,12 @@ struct Console::Impl {
       case Wanted::kTrainingNew:
       case Wanted::kTrainingLeave:
       case Wanted::kAttempt:
-      case Wanted::kAttemptEvents:
-        return training.Answer(routed, settings.scenes);
+      case Wanted::kAttemptEvents: {
+        const std::string person = training.person();
+        HttpResponse response = training.Answer(routed, settings.scenes);
+        if (training.person() != person) films.Stop("Another person is at the cart now.");
+        return response;
+      }
       case Wanted::kEnter:
       case Wanted::kCancel:
         return LeadTask(routed.wanted);

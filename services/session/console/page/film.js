@@ -5,23 +5,30 @@
 
 /** Shows a session in a canvas, and in `note` why there is no picture. `known` is called with the time of its end. */
 function openFilm(session, canvas, note, known) {
-  const failed = why => setText(note, why);
-  let socket = null, closed = false, ready = false, asked = null, wanted = 0, drawing = Promise.resolve();
+  const kPatience = 2000;  // ms until the page says that it waits.
+  let socket = null, broken = false, slow = 0, ready = false, asked = null, wanted = 0, drawing = null, shown = false;
 
+  function failed(why) {
+    if (broken) return;
+    broken = true;
+    clearTimeout(slow);
+    setText(note, why);
+  }
   function ask() {
     if (!ready || asked !== null || !socket) return;
     asked = wanted;
+    slow = setTimeout(() => setText(note, 'The picture is being drawn.'), kPatience);
     socket.send(`t=${asked.toFixed(3)}`);
   }
   async function draw(bytes) {
     const picture = await createImageBitmap(new Blob([bytes], {type: 'image/jpeg'}));
+    if (broken) return picture.close();
     if (canvas.width !== picture.width || canvas.height !== picture.height) {
       canvas.width = picture.width;
       canvas.height = picture.height;
     }
     canvas.getContext('2d').drawImage(picture, 0, 0);
     picture.close();
-    setText(note, '');
     canvas.dataset.pictures = Number(canvas.dataset.pictures || 0) + 1;
   }
   async function take(message) {
@@ -36,6 +43,10 @@ function openFilm(session, canvas, note, known) {
       known(answer.end);
     } else {
       await drawing;
+      if (broken) return;
+      clearTimeout(slow);
+      shown = shown || !!drawing;
+      setText(note, shown ? '' : 'The recording has no picture.');
       canvas.dataset.time = answer.t;
       const again = asked !== wanted;
       asked = null;
@@ -49,17 +60,17 @@ function openFilm(session, canvas, note, known) {
   setText(note, 'Opening the recording.');
   (async () => {
     const answer = await call('/api/ticket', {}).then(r => r.json()).catch(() => null);
-    if (closed) return;
+    if (broken) return;
     if (!answer || !answer.ok) return failed(answer ? answer.text : 'No response from the console.');
     socket = new WebSocket(`${location.origin.replace(/^http/, 'ws')}/film?ticket=${answer.text}`);
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => socket.send(`session=${session}`);
     socket.onmessage = take;
-    socket.onclose = () => { if (!closed) failed('The console shows no more of it; open it again.'); };
+    socket.onclose = () => failed('The connection to the console has ended. Close this attempt and open it again.');
   })();
 
   return {
     show(time) { wanted = time; ask(); },
-    close() { closed = true; if (socket) socket.close(); },
+    close() { broken = true; clearTimeout(slow); if (socket) socket.close(); },
   };
 }

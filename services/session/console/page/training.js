@@ -81,8 +81,11 @@ const training = (() => {
 
   let films = [], time = 0, playing = 0, opened = '';
 
+  let opening = 0;
   async function open(attempt) {
+    const mine = ++opening;
     const answer = await call(`/api/attempt?session=${attempt.session}`).then(r => r.json()).catch(() => null);
+    if (mine !== opening) return;  // Another was opened meanwhile.
     if (!answer || answer.text) return toast(answer ? answer.text : 'No response from the console.', true);
     setText($('attempt-title'), `${attempt.scene}: ${percent(attempt.score)}`);
     const sheet = answer.sheet, rows = [];
@@ -95,6 +98,8 @@ const training = (() => {
       rows.push(row);
     }
     $('sheet').replaceChildren(...rows);
+    play(false);
+    for (const film of films) film.close();
     $('film-expert-box').hidden = !answer.expert;
     $('scrub').max = 0;
     $('play').disabled = true;
@@ -102,7 +107,7 @@ const training = (() => {
     films = [['own', attempt.session], ['expert', answer.expert]].filter(([, session]) => session).map(([side, session]) =>
       openFilm(session, $(`film-${side}`), $(`film-${side}-note`), end => { lengthen(end); $('play').disabled = false; }));
     setTime(0);
-    $('attempt-box').showModal();
+    if (!$('attempt-box').open) $('attempt-box').showModal();
     // Events may be known before the recordings' ends.
     timeline.open(attempt.session, answer.expert, t => { play(false); lengthen(t); setTime(t); });
   }
