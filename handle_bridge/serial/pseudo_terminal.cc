@@ -26,7 +26,7 @@ constexpr std::array<std::pair<int, speed_t>, 8> kSpeeds = {{{9600, B9600},
 
 class TerminalSource final : public ByteSource {
  public:
-  TerminalSource(FileDescriptor fd, std::string unit) : fd_(std::move(fd)), unit_(std::move(unit)) {}
+  TerminalSource(runtime::FileDescriptor fd, std::string unit) : fd_(std::move(fd)), unit_(std::move(unit)) {}
 
   ReadResult Read(std::span<char> buffer) noexcept override {
     // poll(), and read() without data, wait for the kernel worker that moves bytes into the terminal. The worker has no
@@ -47,7 +47,7 @@ class TerminalSource final : public ByteSource {
   [[nodiscard]] std::string_view unit() const noexcept override { return unit_; }
 
  private:
-  FileDescriptor fd_;
+  runtime::FileDescriptor fd_;
   std::string unit_;
 };
 
@@ -103,7 +103,7 @@ std::unique_ptr<ByteSource> TerminalOpener::Open(int baud) {
   if (device.empty()) {
     return nullptr;
   }
-  FileDescriptor fd(::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+  runtime::FileDescriptor fd(::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (!fd.valid() || !SetRaw(fd.get(), baud)) {
     return nullptr;
   }

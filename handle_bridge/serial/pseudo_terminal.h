@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "handle_bridge/serial/byte_source.h"
-#include "handle_bridge/serial/file_descriptor.h"
+#include "services/base/runtime/file_descriptor.h"
 
 namespace fulcrum::handle_bridge {
 
@@ -26,7 +26,7 @@ class PseudoTerminal {
   [[nodiscard]] int ReaderBaud() const noexcept;
 
  private:
-  FileDescriptor master_;
+  runtime::FileDescriptor master_;
   std::string device_;
 };
 

@@ -16,6 +16,7 @@
 
 #include "services/base/core/error.h"
 #include "services/base/core/hash.h"
+#include "services/base/runtime/file_descriptor.h"
 
 namespace fulcrum::runtime {
 namespace {
@@ -56,25 +57,6 @@ std::uint64_t Checksum(std::uint64_t sequence, std::span<const std::byte> payloa
   hash.Add(payload);
   return hash.value();
 }
-
-class FileDescriptor {
- public:
-  explicit FileDescriptor(int fd = -1) : fd_(fd) {}
-  ~FileDescriptor() {
-    if (fd_ >= 0) {
-      ::close(fd_);
-    }
-  }
-  FileDescriptor(FileDescriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  FileDescriptor& operator=(FileDescriptor&& other) noexcept {
-    std::swap(fd_, other.fd_);
-    return *this;
-  }
-  [[nodiscard]] int get() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 [[noreturn]] void Fail(const std::filesystem::path& file, const std::string& what) {
   throw InputError(file.string() + ": checkpoint cannot be " + what + ": " + std::strerror(errno));

@@ -9,25 +9,12 @@
 #include <cstring>
 
 #include "services/base/core/error.h"
+#include "services/base/runtime/file_descriptor.h"
 
 namespace fulcrum::runtime {
 namespace {
 
 constexpr mode_t kOthers = 077;
-
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  [[nodiscard]] int get() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 bool WriteAll(int fd, const std::string& text) {
   for (std::size_t done = 0; done < text.size();) {
@@ -44,7 +31,7 @@ bool WriteAll(int fd, const std::string& text) {
 std::string ReadPrivateFile(const std::filesystem::path& file, std::size_t limit, const std::string& what) {
   const auto fail = [&](const std::string& why) { return InputError(what + " " + file.string() + ": " + why); };
   // O_NONBLOCK: a pipe in place of the file is refused instead of waited for.
-  const Descriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  const FileDescriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   if (fd.get() < 0) throw fail(::strerror(errno));
   struct stat status {};
   if (::fstat(fd.get(), &status) != 0 || !S_ISREG(status.st_mode)) throw fail("cannot be read; it is no plain file");
@@ -70,7 +57,7 @@ void WritePrivateFile(const std::filesystem::path& file, const std::string& text
   int error = 0;
   {
     // O_EXCL and O_NOFOLLOW: an existing file is never written, and no symbolic link is followed.
-    const Descriptor fd(::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600));
+    const FileDescriptor fd(::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600));
     if (fd.get() < 0 || !WriteAll(fd.get(), text)) error = errno;
   }
   if (error == 0 && std::rename(part.c_str(), file.c_str()) != 0) error = errno;
@@ -92,7 +79,7 @@ bool MakePrivateFolder(const std::filesystem::path& folder) {
 
 bool NarrowToOwner(const std::filesystem::path& file) {
   struct stat status {};
-  const Descriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  const FileDescriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   const bool known = fd.get() >= 0 && ::fstat(fd.get(), &status) == 0;
   if (known && (status.st_mode & kOthers) == 0) return false;
   if (known && status.st_uid == ::geteuid() && ::fchmod(fd.get(), status.st_mode & 0700u) == 0) return true;

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "services/base/core/error.h"
+#include "services/base/runtime/file_descriptor.h"
 #include "services/session/console/json.h"
 #include "services/session/console/screen_text.h"
 #include "services/session/supervisor/child_process.h"
@@ -28,24 +29,6 @@ constexpr double kLongest_s = 1e6;
 /// Above the largest picture (kMaxPictureBytes).
 constexpr std::size_t kMostBytes = std::size_t{1} << 22;
 constexpr std::size_t kLongestLine = 100;
-
-/// A file descriptor that is closed at the end of the scope.
-class Descriptor {
- public:
-  explicit Descriptor(int number = -1) : number_(number) {}
-  ~Descriptor() {
-    if (number_ >= 0) ::close(number_);
-  }
-  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
-  Descriptor& operator=(Descriptor&& other) noexcept {
-    std::swap(number_, other.number_);
-    return *this;
-  }
-  [[nodiscard]] int get() const { return number_; }
-
- private:
-  int number_;
-};
 
 /// Reads lines and bytes of a stream to its end.
 class Reader {
@@ -122,9 +105,9 @@ class AttemptFilms::Projector {
     if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair.data()) != 0) {
       throw InputError(std::string("no socket for the film: ") + ::strerror(errno));
     }
-    ours_ = Descriptor(pair[0]);
-    const Descriptor theirs(pair[1]);
-    log_ = Descriptor(::memfd_create("film", MFD_CLOEXEC));
+    ours_ = runtime::FileDescriptor(pair[0]);
+    const runtime::FileDescriptor theirs(pair[1]);
+    log_ = runtime::FileDescriptor(::memfd_create("film", MFD_CLOEXEC));
     if (log_.get() < 0) throw InputError(std::string("no memory for the film's messages: ") + ::strerror(errno));
     process_ = supervisor::ChildProcess::StartOn(replayer, {recording.string(), "--film"},
                                                  {.input = theirs.get(), .output = theirs.get(), .error = log_.get()});
@@ -157,7 +140,7 @@ class AttemptFilms::Projector {
   }
 
   const std::uint64_t number_;
-  Descriptor ours_, log_;
+  runtime::FileDescriptor ours_, log_;
   supervisor::ChildProcess process_;
   std::jthread thread_;
 };

@@ -5,7 +5,7 @@
 
 #include <utility>
 
-namespace fulcrum::handle_bridge {
+namespace fulcrum::runtime {
 
 class FileDescriptor {
  public:
@@ -29,4 +29,4 @@ class FileDescriptor {
   int fd_;
 };
 
-}  // namespace fulcrum::handle_bridge
+}  // namespace fulcrum::runtime
