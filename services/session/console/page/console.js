@@ -45,6 +45,15 @@ async function order(path, fields, well) {
   }
 }
 
+/** Opens a WebSocket of the console. Throws with the reason of a refusal. */
+async function openSocket(path) {
+  const answer = await call('/api/ticket', {}).then(r => r.json());
+  if (!answer.ok) throw new Error(answer.text);
+  const socket = new WebSocket(`${location.origin.replace(/^http/, 'ws')}${path}?ticket=${answer.text}`);
+  socket.binaryType = 'arraybuffer';
+  return socket;
+}
+
 let toastTimer = 0;
 function toast(text, bad) {
   $('toast').textContent = text;
@@ -251,9 +260,10 @@ function clearPicture() {
   const g = $('picture').getContext('2d');
   g.clearRect(0, 0, $('picture').width, $('picture').height);
 }
-/** Draws a picture's file at its own size. */
-async function drawPicture(file) {
-  const image = await createImageBitmap(file), canvas = $('picture');
+/** Draws a picture's file in a canvas, at its own size, unless it is out of date when it has been decoded. */
+async function drawPicture(file, canvas = $('picture'), isOld = () => false) {
+  const image = await createImageBitmap(file);
+  if (isOld()) return image.close();
   if (canvas.width !== image.width || canvas.height !== image.height) {
     canvas.width = image.width;
     canvas.height = image.height;

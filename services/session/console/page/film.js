@@ -21,14 +21,7 @@ function openFilm(session, canvas, note, known) {
     socket.send(`t=${asked.toFixed(3)}`);
   }
   async function draw(bytes) {
-    const picture = await createImageBitmap(new Blob([bytes], {type: 'image/jpeg'}));
-    if (broken) return picture.close();
-    if (canvas.width !== picture.width || canvas.height !== picture.height) {
-      canvas.width = picture.width;
-      canvas.height = picture.height;
-    }
-    canvas.getContext('2d').drawImage(picture, 0, 0);
-    picture.close();
+    await drawPicture(new Blob([bytes], {type: 'image/jpeg'}), canvas, () => broken);
     canvas.dataset.pictures = Number(canvas.dataset.pictures || 0) + 1;
   }
   async function take(message) {
@@ -59,11 +52,12 @@ function openFilm(session, canvas, note, known) {
   delete canvas.dataset.time;
   setText(note, 'Opening the recording.');
   (async () => {
-    const answer = await call('/api/ticket', {}).then(r => r.json()).catch(() => null);
-    if (broken) return;
-    if (!answer || !answer.ok) return failed(answer ? answer.text : 'No response from the console.');
-    socket = new WebSocket(`${location.origin.replace(/^http/, 'ws')}/film?ticket=${answer.text}`);
-    socket.binaryType = 'arraybuffer';
+    let opened;
+    try {
+      opened = await openSocket('/film');
+    } catch (error) { return failed(`No connection to the console: ${error.message}`); }
+    if (broken) return opened.close();
+    socket = opened;
     socket.onopen = () => socket.send(`session=${session}`);
     socket.onmessage = take;
     socket.onclose = () => failed('The connection to the console has ended. Close this attempt and open it again.');

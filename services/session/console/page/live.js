@@ -52,10 +52,7 @@ const live = (() => {
     if (socket || connecting || !running) return;
     connecting = true;
     try {
-      const answer = await call('/api/ticket', {}).then(r => r.json());
-      if (!answer.ok) throw new Error(answer.text);
-      const opened = new WebSocket(`${location.origin.replace(/^http/, 'ws')}/live?ticket=${answer.text}`);
-      opened.binaryType = 'arraybuffer';
+      const opened = await openSocket('/live');
       opened.onmessage = take;
       opened.onclose = () => {
         socket = null;
