@@ -99,7 +99,9 @@ void RenderNode::Step(const Tick& tick) {
 }
 
 void RenderNode::FollowEffects() {
-  if (ready()) changed_on_screen_ |= view_.UpdateEffects(session_time_s_);
+  if (!ready() || !view_.UpdateEffects(session_time_s_)) return;
+  changed_on_screen_ = true;
+  view_.Update();  // Blood runs down the present shape, and steam rises from it.
 }
 
 void RenderNode::Finish() {

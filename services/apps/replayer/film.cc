@@ -26,8 +26,6 @@ namespace {
 
 /// Longest time between two steps of the renderer: its effects follow the instruments, and its inputs keep few samples.
 constexpr double kStep_s = 1.0 / 30;
-/// A larger jump leaves out the tissue on the way, of which only the newest counts.
-constexpr double kJump_s = 3;
 constexpr int kNice = 10;
 constexpr std::chrono::seconds kPatience{5};
 
@@ -113,9 +111,8 @@ struct Film::Impl {
     return next_s.has_value();
   }
 
-  /// Hands over what was recorded up to a time, in steps that draw nothing; without the tissue before `tissue_from_s`.
-  void ReadTo(double time_s, double tissue_from_s) {
-    replay->SkipTissueBefore(tissue_from_s);
+  /// Hands over what was recorded up to a time, in steps that draw nothing.
+  void ReadTo(double time_s) {
     double due_s = shown_s + kStep_s;
     while (read_s < time_s && Read()) {
       if (read_s < due_s || read_s >= time_s) continue;
@@ -146,13 +143,7 @@ std::span<const std::uint8_t> Film::At(double time_s) {
   time_s = std::clamp(time_s, 0.0, film.end_s);
   if (time_s < film.shown_s) film.Begin();
   film.screen.Want(false);
-  if (time_s > film.shown_s + kJump_s) {
-    const std::uint64_t tissue = film.replay->tissue_frames();
-    film.ReadTo(time_s, time_s - kJump_s / 2);
-    // The tissue is older where nothing was published for a while.
-    if (film.replay->tissue_frames() == tissue) film.Begin();
-  }
-  film.ReadTo(time_s, 0);
+  film.ReadTo(time_s);
   film.screen.Want(true);
   film.shown_s = time_s;
   render::RenderNode& node = film.replay->node();

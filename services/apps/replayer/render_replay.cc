@@ -1,7 +1,6 @@
 #include "services/apps/replayer/render_replay.h"
 
 #include <algorithm>
-#include <limits>
 #include <span>
 #include <string>
 #include <tuple>
@@ -26,18 +25,15 @@ class Feed {
     if (bus::DecodeCdr(bytes, &message_)) {
       out_->Write(message_);
       *stamp_ns = std::max(*stamp_ns, bus::StampOf(message_).stamp_ns);
-      ++count_;
     }
     return true;
   }
-  [[nodiscard]] std::uint64_t count() const { return count_; }
 
  private:
   bus::InProcessTopic<T> topic_;
   std::unique_ptr<bus::Input<T>> in_ = topic_.MakeInput();
   std::unique_ptr<typename bus::OutputOf<T>::type> out_ = topic_.MakeOutput();
   T message_;
-  std::uint64_t count_ = 0;
 };
 
 using Feeds =
@@ -81,27 +77,18 @@ struct RenderReplay::Impl {
   render::RenderNode node;
   std::optional<SceneManifest> session;
   std::int64_t newest_ns = 0;
-  double tissue_from_s = -std::numeric_limits<double>::infinity();
   Tick tick;
 };
 
 RenderReplay::RenderReplay(const std::filesystem::path& recording, const SceneView& scene,
                            const render::RenderSettings& settings, bus::LoanOutput<Picture>* pictures)
-    : impl_(std::make_unique<Impl>(recording, scene, settings, pictures)) {
-  impl_->messages.reader().PassOver([impl = impl_.get()](const recording::McapChannel& channel) {
-    if (channel.topic != bus::RoleOf<TissueFrame>().name || !impl->session) return true;
-    const recording::McapReader& reader = impl->messages.reader();
-    return impl->TimeOf(static_cast<std::int64_t>(reader.last_ns()) - ClockOffset(reader)) >= impl->tissue_from_s;
-  });
-}
+    : impl_(std::make_unique<Impl>(recording, scene, settings, pictures)) {}
 
 RenderReplay::~RenderReplay() = default;
 
 render::RenderNode& RenderReplay::node() { return impl_->node; }
 
 std::int64_t RenderReplay::session_start_ns() const { return impl_->session->session_start_ns; }
-
-void RenderReplay::SkipTissueBefore(double time_s) { impl_->tissue_from_s = time_s; }
 
 std::optional<double> RenderReplay::Next() {
   recording::McapMessage message{};
@@ -118,8 +105,6 @@ std::optional<double> RenderReplay::Next() {
   }
   return std::nullopt;
 }
-
-std::uint64_t RenderReplay::tissue_frames() const { return std::get<Feed<TissueFrame>>(impl_->feeds).count(); }
 
 void RenderReplay::Step(double time_s) {
   Tick& tick = impl_->tick;

@@ -28,12 +28,6 @@ class RenderReplay {
   /// CLOCK_MONOTONIC at session time 0 [ns]; valid after Next() has returned a time.
   [[nodiscard]] std::int64_t session_start_ns() const;
 
-  /// From now on leaves out TissueFrames that were recorded before a session time: reading is several times as fast.
-  void SkipTissueBefore(double time_s);
-
-  /// Number of TissueFrames that were handed over.
-  [[nodiscard]] std::uint64_t tissue_frames() const;
-
   /// One step of the node with the messages handed over so far.
   void Step(double time_s);
 
