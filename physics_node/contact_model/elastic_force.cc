@@ -109,7 +109,9 @@ Vec3f ElasticForce::OnParticle(Index particle) const {
     const float length = d.norm();
     // A thin sheet buckles under pressure: its edges only pull.
     if (length > rest || (!membrane && length > 0.0f)) {
-      force += (stiffness * (length - rest) / length) * d;
+      const float strain = membrane ? length / rest - 1.0f : 0.0f;
+      const float stiffer = 1.0f + scene_.physics.membrane_stiffening * strain * strain;
+      force += (stiffness * stiffer * (length - rest) / length) * d;
     }
   });
   if (membrane) {

@@ -85,6 +85,25 @@ void AddSprings(const TissueScene& scene, ElasticModel* model) {
   }
 }
 
+void AddTriangles(const TissueScene& scene, ElasticModel* model) {
+  const Index rows = scene.membrane.rows, cols = scene.membrane.cols;
+  for (Index row = 0; row + 1 < rows; ++row) {
+    for (Index col = 0; col + 1 < cols; ++col) {
+      const std::size_t n = row * cols + col;
+      for (const bool lower : {false, true}) {
+        ElasticTriangle triangle;
+        triangle.edges = {3 * (lower ? n + cols : n), 3 * (lower ? n : n + 1) + 1, 3 * n + 2};
+        std::array<double, 3> lengths{};
+        for (std::size_t i = 0; i < 3; ++i) {
+          lengths[i] = model->springs[triangle.edges[i]].rest_length;
+        }
+        triangle.rest = RestOfTriangle(lengths, scene.physics.membrane_Et_N_per_m);
+        model->triangles.push_back(triangle);
+      }
+    }
+  }
+}
+
 /// Hinge of quadratic bending (Bergou et al. 2006) over the edge x0 x1 of the triangles (x0, x1, x2) and (x1, x0, x3):
 ///
 ///   k = 3 B / (A0 + A1) [N/m],   c = (c12 + c13, c02 + c03, -c02 - c12, -c03 - c13)
@@ -164,21 +183,59 @@ void AddBindings(const TissueScene& scene, ElasticModel* model) {
   }
 }
 
-/// The load balances the springs in the rest shape; organ, hinges and bindings are free of force there.
+/// Share of its axial stiffness that an edge has as a spring, by the triangles that it is in.
+double ShareOfSprings(const ElasticModel& model, const std::vector<std::size_t>& triangles) {
+  const auto open = [&](std::size_t t) { return !(model.triangles[t].rest.stiffness > 0); };
+  return triangles.empty() ? 1.0
+                           : static_cast<double>(std::count_if(triangles.begin(), triangles.end(), open)) /
+                                 static_cast<double>(triangles.size());
+}
+
+/// The load balances the membrane in the rest shape; organ, hinges and bindings are free of force there.
 void AddLoad(ElasticModel* model) {
   model->load.assign(model->rest_position.size(), Vec3d::Zero());
-  for (const ElasticSpring& spring : model->springs) {
-    if (spring.axial > 0) {
-      const Vec3d d = model->rest_position[spring.b] - model->rest_position[spring.a];
+  const auto pull = [&](const ElasticSpring& spring, const Vec3d& force) {
+    model->load[spring.a] -= force;
+    model->load[spring.b] += force;
+  };
+  const auto along = [&](const ElasticSpring& spring) {
+    return Vec3d(model->rest_position[spring.b] - model->rest_position[spring.a]);
+  };
+  const std::vector<std::vector<std::size_t>> triangles = TrianglesOfEdges(*model);
+  for (std::size_t edge = 0; edge < model->springs.size(); ++edge) {
+    const ElasticSpring& spring = model->springs[edge];
+    const double axial = spring.axial * ShareOfSprings(*model, triangles[edge]);
+    if (axial > 0) {
+      const Vec3d d = along(spring);
       const double strain = d.norm() / spring.rest_length - 1;
-      const Vec3d force = spring.axial * (strain + model->stiffening * strain * strain * strain) * d.normalized();
-      model->load[spring.a] -= force;
-      model->load[spring.b] += force;
+      pull(spring, axial * (strain + model->spring_stiffening() * strain * strain * strain) * d.normalized());
+    }
+  }
+  for (const ElasticTriangle& triangle : model->triangles) {
+    std::array<double, 3> squares{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      squares[i] = along(model->springs[triangle.edges[i]]).squaredNorm();
+    }
+    const TriangleTerms terms =
+        EvaluateTriangle(triangle.rest, model->triangle_stiffening(), squares, TriangleCoupling::kForce);
+    for (std::size_t i = 0; i < 3 && triangle.rest.stiffness > 0; ++i) {
+      const ElasticSpring& spring = model->springs[triangle.edges[i]];
+      pull(spring, terms.tension[static_cast<Eigen::Index>(i)] * along(spring));
     }
   }
 }
 
 }  // namespace
+
+std::vector<std::vector<std::size_t>> TrianglesOfEdges(const ElasticModel& model) {
+  std::vector<std::vector<std::size_t>> of(model.springs.size());
+  for (std::size_t t = 0; t < model.triangles.size(); ++t) {
+    for (const std::size_t edge : model.triangles[t].edges) {
+      of[edge].push_back(t);
+    }
+  }
+  return of;
+}
 
 ElasticModel BuildElasticModel(const TissueScene& scene) {
   ElasticModel model;
@@ -190,6 +247,9 @@ ElasticModel BuildElasticModel(const TissueScene& scene) {
   model.damping_per_s = scene.physics.damping_per_s;
   model.gravity = scene.physics.gravity.cast<double>();
   AddSprings(scene, &model);
+  if (scene.physics.membrane_model == MembraneModel::kContinuum) {
+    AddTriangles(scene, &model);
+  }
   AddHinges(scene, &model);
   AddTets(scene, &model);
   AddBindings(scene, &model);

@@ -2,9 +2,14 @@
 // into vectors, the reference solver of the tests minimises it directly: their difference is the error of the solver.
 //
 //   E(x) = sum springs  A L (e^2 / 2 + c e^4 / 4),      e = |x_j - x_i| / L - 1        (membrane)
+//        + sum triangles of the membrane, see triangle_energy.h       (model continuum: instead of whole springs)
 //        + sum hinges   k / 2 |sum_i c_i (x_i - X_i)|^2                                  (membrane bending)
 //        + organ: nodal patches, see below                                              (tet_energy.h)
 //        + sum bindings k / 2 (|x_m - sum_i b_i x_i| - d)^2                              (eq. 9 of the paper)
+//
+// Model continuum: a triangle whose three edges exist carries the sheet, and its edges have no springs of their own. A
+// triangle that a cut has opened is not a continuum any more: its edges that are left act as springs, each with the
+// share that the triangle has of it (all of its axial stiffness where both triangles are open).
 //
 // with inertia M, viscous drag -damping M v and a dead load. A prestrained membrane would leave its rest shape. The
 // forces that hold it there (pressure, fat, neighbouring tissue) are not modelled; the dead load replaces them and
@@ -28,6 +33,7 @@
 #include <array>
 #include <vector>
 
+#include "physics_node/energy/triangle_energy.h"
 #include "services/base/core/scene_view.h"
 
 namespace fulcrum::physics {
@@ -37,6 +43,12 @@ struct ElasticSpring {
   Index a = 0, b = 0;      ///< Particles.
   double rest_length = 0;  ///< Without tension: with prestrain shorter than in the rest shape [m].
   double axial = 0;        ///< A: tension per engineering strain [N]; 0 where the grid has no such edge.
+};
+
+/// Triangle 2 * cell + half of TissueModel: half 0 has the corners n00, n01, n11, half 1 n00, n10, n11.
+struct ElasticTriangle {
+  std::array<std::size_t, 3> edges{};  ///< Indices of springs: along the row, down the column, diagonal.
+  TriangleRest rest;
 };
 
 /// Quadratic bending (Bergou et al. 2006) about the rest shape: constant Hessian, no singular angles. The rest
@@ -88,23 +100,32 @@ struct ElasticModel {
   std::vector<double> mass;          ///< [n] kg; 0 = fixed.
   std::vector<Vec3d> load;           ///< [n] N: balances the prestrain in the rest shape; energy -load . x.
   std::vector<ElasticSpring> springs;
+  std::vector<ElasticTriangle> triangles;  ///< Of model continuum; empty: springs carry the membrane.
   std::vector<ElasticHinge> hinges;
   std::vector<ElasticTet> tets;               ///< Volumes and inversions; the energy is in the patches.
   std::vector<ElasticPatch> patches;          ///< [vertices of tets], sorted by vertex.
   std::vector<ElasticPatchLink> patch_links;  ///< Sorted by vertex within a patch; always contains the patch's own.
   std::vector<ElasticShearLink> shear_links;  ///< Sorted by (a, b), a < b.
   std::vector<ElasticBinding> bindings;
-  double stiffening = 0;            ///< c of the springs.
+  double stiffening = 0;            ///< c of the membrane.
   double mu_Pa = 0, lambda_Pa = 0;  ///< Lamé parameters of the organ.
   double damping_per_s = 0;
   Vec3d gravity = Vec3d::Zero();
 
+  /// c of the springs. Those of opened triangles do not stiffen: on an edge of next to no length it would have no bound.
+  [[nodiscard]] double spring_stiffening() const { return triangles.empty() ? stiffening : 0; }
+  /// b of the triangles.
+  [[nodiscard]] double triangle_stiffening() const { return stiffening / 6; }
   [[nodiscard]] bool fixed(Index particle) const { return mass[particle] == 0.0; }
 };
 
 /// Moduli into elements. Springs: a row or column of the grid carries E t times its share of the width, so a strip in
-/// uniaxial tension along rows or columns is exact; diagonals give the sheet its shear stiffness.
+/// uniaxial tension along rows or columns is exact; diagonals give the sheet its shear stiffness. Triangles with
+/// membrane_model continuum.
 [[nodiscard]] ElasticModel BuildElasticModel(const TissueScene& scene);
+
+/// Triangles that an edge is in, up to two; less at the rim.
+[[nodiscard]] std::vector<std::vector<std::size_t>> TrianglesOfEdges(const ElasticModel& model);
 
 /// Fills patches, patch_links and shear_links from rest_position, tets and mu_Pa; BuildElasticModel does so too.
 void AddOrganPatches(ElasticModel* model);

@@ -57,7 +57,7 @@ void CoarseSpace::ScaleHats(const Sheet& sheet) {
   const auto whole = [&](int row, int col, std::size_t d) {
     const bool inside = row >= 0 && row < sheet_rows_ && col >= 0 && col < static_cast<int>(layout_.cols);
     return inside &&
-           sheet.axial[d][layout_.Offset(static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(col))] > 0;
+           sheet.whole[d][layout_.Offset(static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(col))] > 0;
   };
   for (const std::uint32_t hat : edited) {
     const auto r = static_cast<std::size_t>(hat / hats_.width);

@@ -326,7 +326,7 @@ void CoarseSpace::AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, flo
     for (std::size_t d = 0; d < 3; ++d) {
       const std::size_t down = d != 0 ? stride : 0;
       const std::uint32_t to = d != 1 ? col + 1 : col;
-      if (to >= cols || (down && row + 1 >= sheet_rows_) || !(value(sheet.axial[d], col) > 0.0f)) {
+      if (to >= cols || (down && row + 1 >= sheet_rows_) || !(value(sheet.whole[d], col) > 0.0f)) {
         continue;
       }
       float e[3];

@@ -17,9 +17,12 @@ struct SheetModel {
   SheetModel(const TissueScene& scene, const ElasticModel& model, const ParticleStore& particles);
 
   std::array<FloatArray, 3> axial;         ///< By direction: tension per strain [N]; 0 where the grid has no edge.
+  bool continuum;                          ///< Cells have triangles.
+  float Et;                                ///< Modulus times thickness [N/m].
   std::array<FloatArray, 3> inverse_rest;  ///< By direction: 1 / L [1/m].
   FloatArray mass;                         ///< [kg]
   float stiffening;                        ///< c of tension = axial (e + c e^3).
+  float triangle_stiffening;               ///< b of the triangles.
   float rest_scale;                        ///< Length without tension over length in the rest shape.
 };
 

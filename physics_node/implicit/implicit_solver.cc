@@ -129,6 +129,8 @@ void ImplicitSolver::UpdateTopology(const TissueModel& tissue) {
     const Index row = edge / 3 / grid.cols, col = edge / 3 % grid.cols, direction = edge % 3;
     state_.edges.Update(tissue, row, col, direction);
     state_.coarse.MarkEdit(row, col, direction);
+    // The lower triangle of an edge along a row belongs to the row above.
+    wake(row > 0 ? row - 1 : 0, col);
     wake(row, col);
     wake(std::min(row + 1, grid.rows - 1), col);
   }

@@ -34,14 +34,15 @@ struct SolverContext {
 struct Linearisation {
   explicit Linearisation(const ImplicitModel& model);
 
-  FloatArray point;                           ///< x* [m]; where nothing is computed, the position.
-  FloatArray residual;                        ///< r(x*) [N]; after a solve, where it is wanted, that of x* + d.
-  std::array<FloatArray, 3> kt, along;        ///< Of the membrane's edges, as in SheetMatrix.
-  std::array<FloatArray, 6> sheet_blocks;     ///< Inverse diagonal blocks, as in SheetMatrix.
-  FloatArray organ_c, organ_f, organ_blocks;  ///< As in OrganMatrix.
-  FloatArray element_diagonal;                ///< By FieldLayout::ScalarIndex, contacts and folds included [N/m].
-  std::vector<std::size_t> raised;            ///< Entries of element_diagonal that differ from the model's.
-  bool lacks_element_forces = false;          ///< Bindings and hinges are yet to be added to the residual.
+  FloatArray point;                                   ///< x* [m]; where nothing is computed, the position.
+  FloatArray residual;                                ///< r(x*) [N]; after a solve, where it is wanted, that of x* + d.
+  std::array<FloatArray, 3> kt, along;                ///< Of the membrane's edges, as in SheetMatrix.
+  std::array<std::array<FloatArray, 3>, 2> coupling;  ///< Of the membrane's triangles; empty without.
+  std::array<FloatArray, 6> sheet_blocks;             ///< Inverse diagonal blocks, as in SheetMatrix.
+  FloatArray organ_c, organ_f, organ_blocks;          ///< As in OrganMatrix.
+  FloatArray element_diagonal;        ///< By FieldLayout::ScalarIndex, contacts and folds included [N/m].
+  std::vector<std::size_t> raised;    ///< Entries of element_diagonal that differ from the model's.
+  bool lacks_element_forces = false;  ///< Bindings and hinges are yet to be added to the residual.
 };
 
 /// Which diagonal blocks of the organ are renewed.

@@ -25,15 +25,24 @@ inline constexpr float kFiniteSquare = 1e30f;
 /// coordinate (1e-9 m), keeps coincident nodes finite.
 inline constexpr float kLeastSquare_m2 = 1e-24f;
 
+/// As kLeastDeterminant of energy/triangle_energy.h.
+inline constexpr float kLeastSheetDeterminant = 0.5f;
+
 /// The membrane. Edges of a node lead to (r, c+1), (r+1, c), (r+1, c+1), as in TopologyState.
 struct Sheet {
   int rows;
   int slots;                     ///< Vectors of a row.
   const float* inverse_rest[3];  ///< 1 / L [1/m]
-  const float* axial[3];         ///< A: tension per strain [N]; 0: no such edge.
+  const float* axial[3];         ///< A of the edge as a spring: tension per strain [N]; 0: none.
+  const float* whole[3];         ///< A of an edge that no triangle carries [N]; 0: no such edge.
   float stiffening;              ///< c of tension = A (e + c e^3).
-  const float* w;                ///< Inverse mass in effect [1/kg]; 0: the node does not move.
-  const float* mass;             ///< [kg]
+  /// Model continuum: a and alpha of a cell's triangles (energy/triangle_energy.h) [J], [1/m^2]; null: springs alone.
+  const float* triangle[2];
+  const float* trace[2][3];
+  float triangle_stiffening;            ///< b
+  const unsigned char* springs_in_row;  ///< [rows] 0: no edge of the row is a spring.
+  const float* w;                       ///< Inverse mass in effect [1/kg]; 0: the node does not move.
+  const float* mass;                    ///< [kg]
 };
 
 /// One substep's constants. Backward Euler with drag: a particle resists a correction d with mass * inertia * d.
@@ -44,19 +53,25 @@ struct Inertia {
 };
 
 /// What a linearisation of the sheet leaves behind for the products with its matrix. An edge's stiffness is
-/// kt I + along e e^T with e from its first node to its second at `point`; positive semi-definite by construction.
+/// kt I + along e e^T with e from its first node to its second at `point`; two edges i, j of a triangle are coupled by
+/// coupling e_i e_j^T. Positive semi-definite by construction.
 struct SheetMatrix {
   float* kt[3];           ///< Transverse stiffness [N/m].
   float* along[3];        ///< Axial stiffness less the transverse one, over the squared length [N/m^3].
-  float* block[6];        ///< Inverse of the diagonal blocks: xx, yy, zz, xy, xz, yz; 0 where a node stays [m/N].
+  float* coupling[2][3];  ///< By half of a cell: edges 0 1, 0 2, 1 2 of the triangle [N/m^3].
+  /// Inverse of the diagonal blocks of edges, elements and masses, without `coupling`: xx, yy, zz, xy, xz, yz; 0 where
+  /// a node stays [m/N].
+  float* block[6];
   const float* point[3];  ///< The linearisation point [m].
 };
 
 /// What an edge does to one of its ends in a linearisation: the force (3) and the entries of its stiffness (6).
 inline constexpr int kEdgeTerms = 9;
-/// Rows that a thread needs for what an edge hands to the row below, in planes of a row: those from above and those for
-/// below.
-inline constexpr int kCarryPlanes = 2 * kEdgeTerms;
+/// What a cell hands to the row below, in planes of a row: the terms of its edges there, and tension and `along` of the
+/// lower triangle's edge that the row below owns.
+inline constexpr int kRowTerms = kEdgeTerms + 2;
+/// Rows that a thread needs for that: those from above and those for below.
+inline constexpr int kCarryPlanes = 2 * kRowTerms;
 
 /// Rows and columns of the membrane from one hat to the next, and from its middle to its rim. Assumed.
 inline constexpr int kHatSpacing = 4;
@@ -160,8 +175,10 @@ struct SheetKernels {
   /// start for the others.
   PredictionCount (*predict)(const Sheet& sheet, float h, float limit, const float* const start[3],
                              const float* const velocity[3], float* const point[3], int row0, int row1);
+  /// With `above` also the matrix of the row before row0: its triangles reach into row0, and its region is not
+  /// computed.
   void (*linearise)(const Sheet& sheet, const Inertia& inertia, const SheetFields& fields, const SheetMatrix& matrix,
-                    float* carry, int row0, int row1);
+                    float* carry, bool above, int row0, int row1);
   /// out <- K p + mass * inertia * p. Returns p . out.
   double (*apply)(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
                   float* const out[3], float* carry, int row0, int row1);

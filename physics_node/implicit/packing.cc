@@ -1,21 +1,14 @@
-// The solver's memory: how the arrays of ImplicitModel are made of an ElasticModel, how SheetEdges follow cuts and
-// shrinking, what state and scratch allocate, and the views of them that kernels get.
+// The solver's memory: how the arrays of ImplicitModel are made of an ElasticModel, what state and scratch allocate,
+// and the views of them that kernels get.
 #include <algorithm>
 #include <utility>
 
 #include "physics_node/implicit/elements.h"
 #include "physics_node/implicit/implicit_model.h"
 #include "physics_node/implicit/implicit_state.h"
-#include "physics_node/implicit/sheet_edges.h"
 
 namespace fulcrum::physics::implicit {
 namespace {
-
-/// Lost edges from which on a node is frayed, of six: the border of a clean cut loses two.
-constexpr int kFrayedEdges = 3;
-/// Stiffness of a frayed node's edges in every direction, in the matrix only, over that along them. Of 0, 2, 5, 20 and
-/// 50 % this one evaluated the energy least often (deploy/docs/measurements/physics, Shreds).
-constexpr float kFrayedStiffness = 0.05f;
 
 /// Memory is reserved for so many entries of the diagonal that contacts raise, and for so many particles of a query;
 /// with more the lists grow.
@@ -40,9 +33,14 @@ std::vector<std::pair<ParticleRef, ParticleRef>> JoinedParticles(const ElasticMo
 
 }  // namespace
 
+static_assert(kLeastSheetDeterminant == static_cast<float>(kLeastDeterminant));
+
 SheetModel::SheetModel(const TissueScene& scene, const ElasticModel& model, const ParticleStore& particles)
-    : mass(particles.layout().plane()),
-      stiffening(static_cast<float>(model.stiffening)),
+    : continuum(!model.triangles.empty()),
+      Et(scene.physics.membrane_Et_N_per_m),
+      mass(particles.layout().plane()),
+      stiffening(static_cast<float>(model.spring_stiffening())),
+      triangle_stiffening(static_cast<float>(model.triangle_stiffening())),
       rest_scale(1.0f / (1.0f + scene.physics.membrane_prestrain)) {
   const GridLayout& layout = particles.layout();
   for (std::size_t d = 0; d < 3; ++d) {
@@ -159,86 +157,15 @@ Inertia ImplicitModel::InertiaOf(float h) const {
   return {h, (1.0f + damping_per_s * h) / (h * h), {gravity.x(), gravity.y(), gravity.z()}};
 }
 
-SheetEdges::SheetEdges(const ImplicitModel& model, const TissueModel& tissue) : model_(model) {
-  const std::size_t plane = model.layout.plane;
-  for (std::size_t d = 0; d < 3; ++d) {
-    axial_[d] = FloatArray(plane);
-    inverse_rest_[d] = FloatArray(plane);
-    std::copy_n(model.sheet.axial[d].data(), plane, axial_[d].data());
-    std::copy_n(model.sheet.inverse_rest[d].data(), plane, inverse_rest_[d].data());
-  }
-  missing_.assign(plane, 0);
-  frayed_nodes_.reserve(plane);
-  frayed_edges_.reserve(3 * plane);  // A frayed node has at most three edges left.
-  for (std::uint32_t row = 0; row < model.grid.rows; ++row) {
-    for (std::uint32_t col = 0; col < model.grid.cols; ++col) {
-      for (std::size_t d = 0; d < 3; ++d) {
-        Update(tissue, row, col, d);
-      }
-    }
-  }
-}
-
-Sheet SheetEdges::View(const float* inverse_mass) const {
-  return {model_.layout.rows,
-          model_.layout.slots,
-          {inverse_rest_[0].data(), inverse_rest_[1].data(), inverse_rest_[2].data()},
-          {axial_[0].data(), axial_[1].data(), axial_[2].data()},
-          model_.sheet.stiffening,
-          inverse_mass,
-          model_.sheet.mass.data()};
-}
-
-void SheetEdges::Update(const TissueModel& tissue, Index row, Index col, std::size_t direction) {
-  const GridLayout& grid = model_.grid;
-  const std::uint32_t at = grid.Offset(row, col);
-  const float rest = tissue.rest(static_cast<int>(direction))[at], before = axial_[direction][at];
-  axial_[direction][at] = rest > 0.0f ? model_.sheet.axial[direction][at] : 0.0f;
-  if (rest > 0.0f) {
-    inverse_rest_[direction][at] = 1.0f / (rest * model_.sheet.rest_scale);
-  }
-  if ((before > 0.0f) != (axial_[direction][at] > 0.0f)) {
-    const int missing = before > 0.0f ? 1 : -1;
-    missing_[at] += missing;
-    missing_[grid.Offset(row + (direction != 0 ? 1 : 0), col + (direction != 1 ? 1 : 0))] += missing;
-  }
-}
-
-void SheetEdges::FindFrayed() {
-  const GridLayout& grid = model_.grid;
-  frayed_nodes_.clear();
-  frayed_edges_.clear();
-  const auto add = [&](std::size_t direction, std::uint32_t at, std::uint32_t far_end) {
-    const float along = axial_[direction][at] * inverse_rest_[direction][at];
-    if (along > 0.0f) {
-      frayed_edges_.push_back({direction, {at, far_end}, kFrayedStiffness * along});
-    }
-  };
-  for (std::uint32_t at = 0; at < missing_.size(); ++at) {
-    if (missing_[at] < kFrayedEdges) {
-      continue;
-    }
-    frayed_nodes_.push_back({static_cast<std::uint32_t>(model_.layout.tube_floats) + at, grid.plane()});
-    const Index row = grid.RowAt(at), col = grid.ColAt(at);
-    for (std::size_t d = 0; d < 3; ++d) {
-      const Index down = d != 0 ? 1 : 0, right = d != 1 ? 1 : 0;
-      if (row + down < grid.rows && col + right < grid.cols) {
-        add(d, at, grid.Offset(row + down, col + right));
-      }
-      // An edge between two frayed nodes is added at the one that owns it.
-      if (row >= down && col >= right && missing_[grid.Offset(row - down, col - right)] < kFrayedEdges) {
-        add(d, grid.Offset(row - down, col - right), at);
-      }
-    }
-  }
-}
-
 Linearisation::Linearisation(const ImplicitModel& model)
     : point(model.layout.floats), residual(model.layout.floats), element_diagonal(model.layout.scalar_count()) {
   const FieldLayout& layout = model.layout;
   for (std::size_t d = 0; d < 3; ++d) {
     kt[d] = FloatArray(layout.plane);
     along[d] = FloatArray(layout.plane);
+    for (std::size_t half = 0; half < 2 && model.sheet.continuum; ++half) {
+      coupling[half][d] = FloatArray(layout.plane);
+    }
   }
   for (FloatArray& block : sheet_blocks) {
     block = FloatArray(layout.plane);
@@ -314,6 +241,9 @@ LinearSystem::LinearSystem(const SolverContext& context, float mass_factor, Solv
   for (std::size_t d = 0; d < 3; ++d) {
     sheet_matrix.kt[d] = at.kt[d].data();
     sheet_matrix.along[d] = at.along[d].data();
+    for (std::size_t half = 0; half < 2; ++half) {
+      sheet_matrix.coupling[half][d] = at.coupling[half][d].data();
+    }
     sheet_matrix.point[d] = point[d];
   }
   for (std::size_t i = 0; i < at.sheet_blocks.size(); ++i) {

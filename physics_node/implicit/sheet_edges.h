@@ -1,8 +1,9 @@
-// The edges of the membrane as cuts and heat have left them, and the nodes that cuts have frayed.
+// The edges and triangles of the membrane as cuts and heat have left them, and the nodes that cuts have frayed.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -35,9 +36,26 @@ class SheetEdges {
   [[nodiscard]] std::span<const FrayedEdge> frayed_edges() const { return frayed_edges_; }
 
  private:
+  /// A triangle of a cell.
+  struct TrianglePlace {
+    Index row, col;
+    std::size_t half;
+  };
+  [[nodiscard]] std::array<std::optional<TrianglePlace>, 2> TrianglesOf(Index row, Index col,
+                                                                        std::size_t direction) const;
+  /// From its three edges; then what these carry as springs.
+  void UpdateTriangle(const TrianglePlace& triangle);
+  void UpdateSpring(Index row, Index col, std::size_t direction);
+
   const ImplicitModel& model_;
-  std::array<FloatArray, 3> axial_, inverse_rest_;  ///< As in Sheet.
-  std::vector<int> missing_;                        ///< By place in a plane: edges that a node has lost to cuts.
+  std::array<FloatArray, 3> axial_, inverse_rest_;  ///< Sheet::whole and inverse_rest.
+  // Of model continuum alone, as in Sheet.
+  std::array<FloatArray, 3> spring_;
+  std::array<FloatArray, 2> triangle_;
+  std::array<std::array<FloatArray, 3>, 2> trace_;
+  std::vector<int> springs_of_row_;
+  std::vector<std::uint8_t> springs_in_row_;
+  std::vector<int> missing_;  ///< By place in a plane: edges that a node has lost to cuts.
   std::vector<ParticleRef> frayed_nodes_;
   std::vector<FrayedEdge> frayed_edges_;
 };

@@ -2,7 +2,8 @@
 // conjugate gradients on fields. Compiled once per instruction set with FULCRUM_KERNEL_NAMESPACE set.
 //
 //   prediction  x* = x_n + min(1, limit / |h v_n|) h v_n
-//   energy      E  = sum edges A L (e^2/2 + c e^4/4) + sum nodes m (s |u|^2/2 - u . v_n / h - u . g) - u . f
+//   energy      E  = sum edges A L (e^2/2 + c e^4/4) + sum triangles
+//                    + sum nodes m (s |u|^2/2 - u . v_n / h - u . g) - u . f
 //   update      v_n+1 = min(1, speed / |v|) v,  v = (x* + d - x_n) / h;   x_n+1 = x_n + h v_n+1
 //   inverse of a symmetric block: its cofactors over its determinant
 //
@@ -21,9 +22,8 @@
 #pragma once
 
 #include "physics_node/implicit/kernels.h"
+#include "physics_node/implicit/sheet_triangles_impl.h"
 #include "physics_node/simd/lanes.h"
-
-#define FULCRUM_INLINE_LAMBDA __attribute__((always_inline))
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 
@@ -147,6 +147,11 @@ inline double SheetEnergy(const Sheet& sheet, const Inertia& inertia, const Shee
         // Where an edge exists, 1 / L is far above the bound; elsewhere axial is 0 and the quotient only finite.
         energy = energy +
                  (axial * (half * e2 + quarter * c * (e2 * e2))) / Max(inverse_rest, F8::All(kLeastInverseRest_per_m));
+      }
+      if (sheet.triangle[0] != nullptr) {
+        const CellEdges<F8> cell = EdgesOfCell<F8>(ends.right - x, ends.below - x, ends.diagonal - x);
+        energy =
+            energy + (TriangleEnergy<F8>(sheet, 0, node, cell.of[0]) + TriangleEnergy<F8>(sheet, 1, node, cell.of[1]));
       }
       const F8 mass = F8::Load(sheet.mass + node) & (F8::Load(sheet.w + node) > zero);
       const V8 moved = x - LoadV(fields.start, node);

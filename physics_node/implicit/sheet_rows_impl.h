@@ -5,7 +5,7 @@
 //   force on i  f = T d / |d|, on j -f
 //   stiffness   K = kt I + along d d^T,  kt = max(T / |d|, 0),  along = max(T' - kt, 0) / |d|^2
 //   residual    r = f + load + m (g - s (x* - x_n) + v_n / h)
-//   block       D = K + (k_e + m s) I, summed over the edges of the node
+//   block       D = K + (k_e + m s) I, summed over the edges of the node, without the coupling of triangles
 //   product     q_i = m s p_i + sum over edges K (p_i - p_j)
 //   curvature   p . q = sum over nodes m s |p_i|^2 + sum over edges (p_j - p_i) . K (p_j - p_i)
 //
@@ -23,15 +23,19 @@
 //     │      ╲                    (three for a product)
 //   (r+1, c) (r+1, c+1)
 //
+// Model continuum adds the triangles of a cell (sheet_triangles_impl.h), at the node that owns the cell.
+//
 // A row is swept slot by slot, or two slots at a time in AVX-512; each lane has the same operations in the same order.
 // A task of rows computes the downward edges of the row above its first one again, so that tasks share nothing.
 #pragma once
 
 #include "physics_node/implicit/sheet_kernels_impl.h"
+#include "physics_node/implicit/sheet_triangles_impl.h"
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 
 using implicit::kEdgeTerms;
+using implicit::kRowTerms;
 
 /// Slots of a row that one register F holds.
 template <class F>
@@ -185,24 +189,58 @@ struct Carried {
   }
 };
 
-/// One row: `above` are the terms that the row above hands down, kEdgeTerms planes of a row; those for the next row go
-/// to `below`. With `only_below` nothing else is done.
-template <bool only_below>
+/// Tension and `along` that an edge has of a triangle of another cell.
+template <class F>
+struct OtherTriangle {
+  F tension, along;
+};
+
+/// One row: `above` are the terms that the row above hands down, kRowTerms planes of a row; those for the next row go
+/// to `below`. With `only_below` nothing else is done but, with `stores`, the matrix of what reaches into the next row.
+/// `springs`: edges can be springs; `triangles`: cells have them.
+template <bool only_below, bool springs, bool triangles>
 FULCRUM_INLINE void LineariseRow(const Sheet& sheet, const Inertia& inertia, const SheetFields& fields,
-                                 const SheetMatrix& matrix, const float* above, float* below, int row) {
+                                 const SheetMatrix& matrix, const float* above, float* below, bool stores, int row) {
   const std::size_t start = RowStart(sheet, row), stride = kLanes * static_cast<std::size_t>(sheet.slots),
                     down_by = Below(sheet, row);
   const auto linearise = [&]<class F>(int d, const V<F>& vector, std::size_t node) FULCRUM_INLINE_LAMBDA {
-    return LineariseEdge<F>(vector, F::Load(sheet.inverse_rest[d] + node), F::Load(sheet.axial[d] + node),
-                            F::All(sheet.stiffening));
+    if constexpr (!springs) {
+      return Linear<F>{vector, F::All(0), F::All(0), F::All(0)};
+    } else {
+      return LineariseEdge<F>(vector, F::Load(sheet.inverse_rest[d] + node), F::Load(sheet.axial[d] + node),
+                              F::All(sheet.stiffening));
+    }
+  };
+  const auto add = []<class F>(Linear<F>* edge, F tension, F along) FULCRUM_INLINE_LAMBDA {
+    edge->tension = edge->tension + tension;
+    edge->kt = edge->kt + Max(tension, F::All(0));
+    edge->along = edge->along + along;
+  };
+  /// Of the edge to the right, what the row above hands down.
+  const auto from_above = [&]<class F>(std::size_t slot) FULCRUM_INLINE_LAMBDA {
+    return OtherTriangle<F>{F::Load(above + kEdgeTerms * stride + slot),
+                            F::Load(above + (kEdgeTerms + 1) * stride + slot)};
   };
   Carried<kEdgeTerms> left, diagonal;
+  Carried<2> upper;
   {
-    const std::size_t last = start + stride - kLanes;
+    const std::size_t slot = stride - kLanes, last = start + slot;
     const V8 x = LoadV(fields.point, last);
     const EndsOf<F8> ends = LoadEndsOf<F8>(sheet, fields.point, start, sheet.slots - 1, down_by);
-    const EdgeTerms<F8> to_right = ActingOnEnds(linearise(0, ends.right - x, last)),
-                        to_diagonal = ActingOnEnds(linearise(2, ends.diagonal - x, last));
+    Linear<F8> right = linearise(0, ends.right - x, last), across = linearise(2, ends.diagonal - x, last);
+    if constexpr (triangles) {
+      const CellEdges<F8> cell = EdgesOfCell<F8>(ends.right - x, ends.below - x, ends.diagonal - x);
+      const TriangleDerivatives<F8> up = LineariseTriangle<F8>(sheet, 0, last, cell.of[0]),
+                                    low = LineariseTriangle<F8>(sheet, 1, last, cell.of[1]);
+      if constexpr (!only_below) {
+        const OtherTriangle<F8> other = from_above.template operator()<F8>(slot);
+        add(&right, up.tension[0] + other.tension, up.along[0] + other.along);
+      }
+      add(&across, up.tension[2] + low.tension[2], up.along[2] + low.along[2]);
+      upper.Begin(RotateUp(up.tension[1]), 0);
+      upper.Begin(RotateUp(up.along[1]), 1);
+    }
+    const EdgeTerms<F8> to_right = ActingOnEnds(right), to_diagonal = ActingOnEnds(across);
     for (int c = 0; c < kEdgeTerms; ++c) {
       left.Begin(RotateUp(to_right.v[c]), c);
       diagonal.Begin(RotateUp(to_diagonal.v[c]), c);
@@ -212,25 +250,43 @@ FULCRUM_INLINE void LineariseRow(const Sheet& sheet, const Inertia& inertia, con
     const std::size_t slot = kLanes * static_cast<std::size_t>(s), node = start + slot;
     const V<F> x = LoadSlots<F>(fields.point, node);
     const EndsOf<F> ends = LoadEndsOf<F>(sheet, fields.point, start, s, down_by);
-    const auto edge = [&](int d, const V<F>& vector) FULCRUM_INLINE_LAMBDA {
-      const Linear<F> result = linearise(d, vector, node);
-      if (!only_below) {
-        result.kt.Store(matrix.kt[d] + node);
-        result.along.Store(matrix.along[d] + node);
+    Linear<F> lines[3] = {linearise(1, ends.below - x, node), linearise(2, ends.diagonal - x, node),
+                          only_below ? Linear<F>{} : linearise(0, ends.right - x, node)};
+    if constexpr (triangles) {
+      const CellEdges<F> cell = EdgesOfCell<F>(ends.right - x, ends.below - x, ends.diagonal - x);
+      const TriangleDerivatives<F> up = LineariseTriangle<F>(sheet, 0, node, cell.of[0]),
+                                   low = LineariseTriangle<F>(sheet, 1, node, cell.of[1]);
+      add(&lines[0], low.tension[1] + upper.Pass(up.tension[1], 0), low.along[1] + upper.Pass(up.along[1], 1));
+      add(&lines[1], up.tension[2] + low.tension[2], up.along[2] + low.along[2]);
+      low.tension[0].Store(below + kEdgeTerms * stride + slot);
+      low.along[0].Store(below + (kEdgeTerms + 1) * stride + slot);
+      if constexpr (!only_below) {
+        const OtherTriangle<F> other = from_above.template operator()<F>(slot);
+        add(&lines[2], up.tension[0] + other.tension, up.along[0] + other.along);
       }
-      return result;
-    };
-    const Linear<F> lines[3] = {edge(1, ends.below - x), edge(2, ends.diagonal - x),
-                                only_below ? Linear<F>{} : edge(0, ends.right - x)};
+      if (!only_below || stores) {
+        for (int i = 0; i < 3; ++i) {
+          up.coupling[i].Store(matrix.coupling[0][i] + node);
+          low.coupling[i].Store(matrix.coupling[1][i] + node);
+        }
+      }
+    }
+    if (!only_below || (triangles && stores)) {
+      constexpr int kDirections[3] = {1, 2, 0};
+      for (int i = 0; i < (only_below ? 2 : 3); ++i) {
+        lines[i].kt.Store(matrix.kt[kDirections[i]] + node);
+        lines[i].along.Store(matrix.along[kDirections[i]] + node);
+      }
+    }
     EdgeTerms<F> sum;
     {
       const EdgeTerms<F> down = ActingOnEnds(lines[0]), across = ActingOnEnds(lines[1]);
+      for (int c = 0; c < kEdgeTerms && !only_below; ++c) {
+        sum.v[c] =
+            AddAtFarEnd(down.v[c], F::Load(above + static_cast<std::size_t>(c) * stride + slot), c) + across.v[c];
+      }
       for (int c = 0; c < kEdgeTerms; ++c) {
-        const auto plane = static_cast<std::size_t>(c) * stride + slot;
-        if (!only_below) {
-          sum.v[c] = AddAtFarEnd(down.v[c], F::Load(above + plane), c) + across.v[c];
-        }
-        (down.v[c] + diagonal.Pass(across.v[c], c)).Store(below + plane);
+        (down.v[c] + diagonal.Pass(across.v[c], c)).Store(below + static_cast<std::size_t>(c) * stride + slot);
       }
     }
     if (only_below) {
@@ -256,41 +312,82 @@ FULCRUM_INLINE void LineariseRow(const Sheet& sheet, const Inertia& inertia, con
   });
 }
 
-inline void SheetLineariseRows(const Sheet& sheet, const Inertia& inertia, const SheetFields& fields,
-                               const SheetMatrix& matrix, float* memory, int row0, int row1) {
-  const std::size_t stride = kLanes * static_cast<std::size_t>(sheet.slots);
-  float *above = memory, *below = memory + kEdgeTerms * stride;
-  if (row0 > 0) {
-    LineariseRow<true>(sheet, inertia, fields, matrix, nullptr, above, row0 - 1);
+/// The variant that the row needs.
+template <bool only_below>
+inline void LineariseAnyRow(const Sheet& sheet, const Inertia& inertia, const SheetFields& fields,
+                            const SheetMatrix& matrix, const float* above, float* below, bool stores, int row) {
+  if (sheet.triangle[0] == nullptr) {
+    LineariseRow<only_below, true, false>(sheet, inertia, fields, matrix, above, below, stores, row);
+  } else if (sheet.springs_in_row[row] != 0) {
+    LineariseRow<only_below, true, true>(sheet, inertia, fields, matrix, above, below, stores, row);
   } else {
-    Clear(above, kEdgeTerms * stride);
+    LineariseRow<only_below, false, true>(sheet, inertia, fields, matrix, above, below, stores, row);
+  }
+}
+
+inline void SheetLineariseRows(const Sheet& sheet, const Inertia& inertia, const SheetFields& fields,
+                               const SheetMatrix& matrix, float* memory, bool stores_above, int row0, int row1) {
+  const std::size_t stride = kLanes * static_cast<std::size_t>(sheet.slots);
+  float *above = memory, *below = memory + kRowTerms * stride;
+  if (row0 > 0) {
+    LineariseAnyRow<true>(sheet, inertia, fields, matrix, nullptr, above, stores_above, row0 - 1);
+  } else {
+    Clear(above, kRowTerms * stride);
   }
   for (int row = row0; row < row1; ++row) {
-    LineariseRow<false>(sheet, inertia, fields, matrix, above, below, row);
+    LineariseAnyRow<false>(sheet, inertia, fields, matrix, above, below, true, row);
     float* const used = above;
     above = below;
     below = used;
   }
 }
 
-/// K p of one row's edges and its inertia into `out`, the terms for the next row into `below` [3]. Returns p . out.
-template <bool only_below>
+/// What the edges and triangles of a cell pull at the nodes to its right, below and along the diagonal: K dp. The node
+/// that owns the cell gets the opposite of their sum.
+template <class F>
+struct CellPull {
+  V<F> right, down, diagonal;
+};
+template <bool triangles, class F>
+FULCRUM_INLINE CellPull<F> PullOfCell(const SheetMatrix& matrix, std::size_t node, const V<F>& x,
+                                      const EndsOf<F>& x_ends, const V<F>& p, const EndsOf<F>& p_ends) {
+  const V<F> d[3] = {x_ends.right - x, x_ends.below - x, x_ends.diagonal - x},
+             dp[3] = {p_ends.right - p, p_ends.below - p, p_ends.diagonal - p};
+  F g[3], factor[3];
+  for (int e = 0; e < 3; ++e) {
+    g[e] = Dot(d[e], dp[e]);
+    factor[e] = F::Load(matrix.along[e] + node) * g[e];
+  }
+  const auto pull = [&](int e)
+                        FULCRUM_INLINE_LAMBDA { return V<F>(dp[e] * F::Load(matrix.kt[e] + node) + d[e] * factor[e]); };
+  if constexpr (!triangles) {
+    return {pull(0), pull(1), pull(2)};
+  } else {
+    // B' begins at the node to the right, R' at the one below; both end on the diagonal.
+    const V<F> far_down = d[2] - d[0], far_right = d[2] - d[1];
+    const CellCoupling<F> coupled = CoupleCell<F>(matrix.coupling, node, g[0], g[1], g[2], Dot(far_down, dp[2] - dp[0]),
+                                                  Dot(far_right, dp[2] - dp[1]));
+    for (int e = 0; e < 3; ++e) {
+      factor[e] = factor[e] + coupled.of[e];
+    }
+    const V<F> by_far_down = far_down * coupled.of[3], by_far_right = far_right * coupled.of[4];
+    return {pull(0) - by_far_down, pull(1) - by_far_right, pull(2) + (by_far_down + by_far_right)};
+  }
+}
+
+/// K p of one row's cells and its inertia into `out`, the terms for the next row into `below` [3]. Returns p . out.
+template <bool only_below, bool triangles>
 FULCRUM_INLINE double ApplyRow(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
                                const float* above, float* below, float* const out[3], int row) {
   const std::size_t start = RowStart(sheet, row), stride = kLanes * static_cast<std::size_t>(sheet.slots),
                     down_by = Below(sheet, row);
-  /// (kt I + along d d^T) dp.
-  const auto edge = [&]<class F>(int e, const V<F>& d, const V<F>& dp, std::size_t node) FULCRUM_INLINE_LAMBDA {
-    return V<F>(dp * F::Load(matrix.kt[e] + node) + d * (F::Load(matrix.along[e] + node) * Dot(d, dp)));
-  };
   Carried<3> left, diagonal;
   {
     const std::size_t last = start + stride - kLanes;
-    const V8 x = LoadV(matrix.point, last), here = LoadV(p, last);
-    const EndsOf<F8> x_ends = LoadEndsOf<F8>(sheet, matrix.point, start, sheet.slots - 1, down_by),
-                     p_ends = LoadEndsOf<F8>(sheet, p, start, sheet.slots - 1, down_by);
-    const V8 to_right = UpV(edge(0, x_ends.right - x, p_ends.right - here, last)),
-             to_diagonal = UpV(edge(2, x_ends.diagonal - x, p_ends.diagonal - here, last));
+    const CellPull<F8> pull = PullOfCell<triangles, F8>(
+        matrix, last, LoadV(matrix.point, last), LoadEndsOf<F8>(sheet, matrix.point, start, sheet.slots - 1, down_by),
+        LoadV(p, last), LoadEndsOf<F8>(sheet, p, start, sheet.slots - 1, down_by));
+    const V8 to_right = UpV(pull.right), to_diagonal = UpV(pull.diagonal);
     const F8 rights[3] = {to_right.x, to_right.y, to_right.z};
     const F8 diagonals[3] = {to_diagonal.x, to_diagonal.y, to_diagonal.z};
     for (int c = 0; c < 3; ++c) {
@@ -306,17 +403,16 @@ FULCRUM_INLINE double ApplyRow(const Sheet& sheet, float inertia, const SheetMat
   RowSum sum;
   ForSlots(sheet.slots, [&]<class F>(int s) FULCRUM_INLINE_LAMBDA {
     const std::size_t slot = kLanes * static_cast<std::size_t>(s), node = start + slot;
-    const V<F> x = LoadSlots<F>(matrix.point, node), here = LoadSlots<F>(p, node);
-    const EndsOf<F> x_ends = LoadEndsOf<F>(sheet, matrix.point, start, s, down_by),
-                    p_ends = LoadEndsOf<F>(sheet, p, start, s, down_by);
-    const V<F> down = edge(1, x_ends.below - x, p_ends.below - here, node),
-               across = edge(2, x_ends.diagonal - x, p_ends.diagonal - here, node);
+    const V<F> here = LoadSlots<F>(p, node);
+    const CellPull<F> pull = PullOfCell<triangles, F>(matrix, node, LoadSlots<F>(matrix.point, node),
+                                                      LoadEndsOf<F>(sheet, matrix.point, start, s, down_by), here,
+                                                      LoadEndsOf<F>(sheet, p, start, s, down_by));
     const V<F> incoming = only_below ? V<F>{} : LoadSlots<F>(from, slot);
-    StoreSlots(down + pass(&diagonal, across), to, slot);
+    StoreSlots(pull.down + pass(&diagonal, pull.diagonal), to, slot);
     if (!only_below) {
-      const V<F> right = edge(0, x_ends.right - x, p_ends.right - here, node);
       const F mass = (F::Load(sheet.mass + node) & (F::Load(sheet.w + node) > F::All(0))) * F::All(inertia);
-      const V<F> result = ((pass(&left, right) + incoming) - ((right + down) + across)) + here * mass;
+      const V<F> result =
+          ((pass(&left, pull.right) + incoming) - ((pull.right + pull.down) + pull.diagonal)) + here * mass;
       StoreSlots(result, out, node);
       sum.Add(Dot(here, result), s);
     }
@@ -324,27 +420,33 @@ FULCRUM_INLINE double ApplyRow(const Sheet& sheet, float inertia, const SheetMat
   return sum.Value();
 }
 
-inline double SheetApply(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
-                         float* const out[3], float* memory, int row0, int row1) {
+template <bool triangles>
+inline double ApplyRows(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
+                        float* const out[3], float* memory, int row0, int row1) {
   const std::size_t stride = kLanes * static_cast<std::size_t>(sheet.slots);
   float *above = memory, *below = memory + 3 * stride;
   if (row0 > 0) {
-    (void)ApplyRow<true>(sheet, inertia, matrix, p, above, above, out, row0 - 1);
+    (void)ApplyRow<true, triangles>(sheet, inertia, matrix, p, above, above, out, row0 - 1);
   } else {
     Clear(above, 3 * stride);
   }
   double sum = 0;
   for (int row = row0; row < row1; ++row) {
-    sum += ApplyRow<false>(sheet, inertia, matrix, p, above, below, out, row);
+    sum += ApplyRow<false, triangles>(sheet, inertia, matrix, p, above, below, out, row);
     float* const used = above;
     above = below;
     below = used;
   }
   return sum;
 }
+inline double SheetApply(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
+                         float* const out[3], float* memory, int row0, int row1) {
+  return sheet.triangle[0] != nullptr ? ApplyRows<true>(sheet, inertia, matrix, p, out, memory, row0, row1)
+                                      : ApplyRows<false>(sheet, inertia, matrix, p, out, memory, row0, row1);
+}
 
 /// p . K p of the edges that begin in one row and of its inertia, or of those alone that lead down from it.
-template <bool only_below>
+template <bool only_below, bool triangles>
 FULCRUM_INLINE double RowCurvature(const Sheet& sheet, float inertia, const SheetMatrix& matrix,
                                    const float* const p[3], int row) {
   const std::size_t start = RowStart(sheet, row), down_by = Below(sheet, row);
@@ -359,6 +461,12 @@ FULCRUM_INLINE double RowCurvature(const Sheet& sheet, float inertia, const Shee
       return F(Dot(dp, dp) * F::Load(matrix.kt[e] + node) + along * along * F::Load(matrix.along[e] + node));
     };
     F of_node = edge(1, x_ends.below - x, p_ends.below - here) + edge(2, x_ends.diagonal - x, p_ends.diagonal - here);
+    if constexpr (triangles) {
+      of_node = of_node +
+                CurvatureOfCell<F>(matrix.coupling, node,
+                                   EdgesOfCell<F>(x_ends.right - x, x_ends.below - x, x_ends.diagonal - x),
+                                   EdgesOfCell<F>(p_ends.right - here, p_ends.below - here, p_ends.diagonal - here));
+    }
     if (!only_below) {
       const F mass = (F::Load(sheet.mass + node) & (F::Load(sheet.w + node) > F::All(0))) * F::All(inertia);
       of_node = of_node + edge(0, x_ends.right - x, p_ends.right - here) + Dot(here, here) * mass;
@@ -368,13 +476,19 @@ FULCRUM_INLINE double RowCurvature(const Sheet& sheet, float inertia, const Shee
   return sum.Value();
 }
 
-inline double SheetCurvature(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
-                             bool above, int row0, int row1) {
-  double sum = above && row0 > 0 ? RowCurvature<true>(sheet, inertia, matrix, p, row0 - 1) : 0;
+template <bool triangles>
+inline double RowsCurvature(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
+                            bool above, int row0, int row1) {
+  double sum = above && row0 > 0 ? RowCurvature<true, triangles>(sheet, inertia, matrix, p, row0 - 1) : 0;
   for (int row = row0; row < row1; ++row) {
-    sum += RowCurvature<false>(sheet, inertia, matrix, p, row);
+    sum += RowCurvature<false, triangles>(sheet, inertia, matrix, p, row);
   }
   return sum;
+}
+inline double SheetCurvature(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
+                             bool above, int row0, int row1) {
+  return sheet.triangle[0] != nullptr ? RowsCurvature<true>(sheet, inertia, matrix, p, above, row0, row1)
+                                      : RowsCurvature<false>(sheet, inertia, matrix, p, above, row0, row1);
 }
 
 }  // namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE

@@ -152,8 +152,10 @@ void LineariseEdgesAndPatches(const SolverContext& context, const Inertia& inert
         const auto i = static_cast<std::size_t>(index);
         const Task& task = i < sheet_tasks ? computed.tasks[i] : computed.patches[i - sheet_tasks];
         if (task.sheet) {
+          const Regions& regions = state->regions;
+          const bool above = task.first > 0 && !regions.computed(regions.partition().At(true, task.first - 1));
           context.kernels.sheet.linearise(system.sheet, inertia, fields, system.sheet_matrix,
-                                          scratch->carry[static_cast<std::size_t>(worker)].data(), task.first,
+                                          scratch->carry[static_cast<std::size_t>(worker)].data(), above, task.first,
                                           task.end);
         } else {
           context.kernels.organ.linearise(system.organ, system.organ_matrix, point, Vertex(task.first),

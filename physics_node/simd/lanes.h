@@ -20,6 +20,7 @@
 
 /// For the bodies of innermost loops: a called function would load its constants again in each iteration.
 #define FULCRUM_INLINE inline __attribute__((always_inline))
+#define FULCRUM_INLINE_LAMBDA __attribute__((always_inline))
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 

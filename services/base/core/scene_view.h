@@ -18,6 +18,9 @@ namespace fulcrum {
 
 enum class PhysicsMode : std::uint32_t { kPaper = 0, kXpbd = 1, kAccurate = 2 };
 
+/// What the membrane of mode accurate is (physics_node/energy/elastic_model.h). The other modes always take springs.
+enum class MembraneModel : std::uint32_t { kSprings = 0, kContinuum = 1 };
+
 /// Work of the accurate solver per step: substeps x iterations of the global solve.
 enum class PhysicsPreset : std::uint32_t { kFast = 0, kDefault = 1, kAccurate = 2, kReference = 3 };
 
@@ -38,8 +41,9 @@ struct PhysicsParams {
   float k_binding = 0.01f;  ///< In tension; ten times as much in compression (capped at 1).
   float tube_youngs_modulus_Pa = 1.0e5f;
   float tube_poisson = 0.45f;
+  MembraneModel membrane_model = MembraneModel::kContinuum;
   float membrane_Et_N_per_m = 150.0f;   ///< Young's modulus times thickness.
-  float membrane_stiffening = 0.0f;     ///< J-shape: tension is E t (e + c e^3) at engineering strain e.
+  float membrane_stiffening = 0.0f;     ///< c of the J-shape: of tension E t (e + c e^3) at engineering strain e.
   float membrane_prestrain = 0.0f;      ///< Strain of the membrane in the rest shape.
   float membrane_bending_Nm = 2.0e-6f;  ///< Flexural rigidity.
   /// Young's modulus of the fat between membrane and organ, which the bindings represent.

@@ -34,6 +34,7 @@ PhysicsParams AccuratePhysics() {
   PhysicsParams physics;
   physics.mode = PhysicsMode::kAccurate;
   physics.damping_per_s = 20.0f;
+  physics.membrane_stiffening = 1.0f;
   physics.membrane_prestrain = 0.04f;
   return physics;
 }

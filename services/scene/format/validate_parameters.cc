@@ -49,6 +49,10 @@ void CheckParameters(const SceneView& s) {
   if (p.preset > PhysicsPreset::kReference) {
     Fail("scene", "physics.preset = ", static_cast<std::uint32_t>(p.preset), "; valid: 0 (fast) to 3 (reference)");
   }
+  if (p.membrane_model > MembraneModel::kContinuum) {
+    Fail("scene", "physics.membrane_model = ", static_cast<std::uint32_t>(p.membrane_model),
+         "; valid: 0 (springs), 1 (continuum)");
+  }
   CheckBounds({{"physics.iterations", static_cast<float>(p.iterations), 1, 1000},
                {"physics.dt_s", p.dt_s, 1e-4f, 0.1f},
                {"physics.damping_per_s", p.damping_per_s, 0, 1000},

@@ -185,6 +185,7 @@ double HangingSheet(int n) {
   data.fixed.membrane.rows = static_cast<std::uint32_t>(rows);
   data.fixed.membrane.cols = static_cast<std::uint32_t>(cols);
   data.fixed.physics.membrane_Et_N_per_m = static_cast<float>(kEt);
+  data.fixed.physics.membrane_model = MembraneModel::kSprings;
   data.fixed.physics.gravity = Vec3f(0, 0, static_cast<float>(-kGravity));
   for (int r = 0; r < rows; ++r) {
     for (int c = 0; c < cols; ++c) {

@@ -10,11 +10,12 @@
 namespace fulcrum::physics::reference {
 namespace {
 
-class ReferenceEnergy : public testing::Test {
+class ReferenceEnergy : public testing::TestWithParam<MembraneModel> {
  protected:
   static ElasticModel Model() {
     const scene::SceneData data = scene::BuildProcedural(scene::Small());
     SceneView view = data.View();
+    view.physics.membrane_model = GetParam();
     view.physics.membrane_prestrain = 0.04f;
     view.physics.membrane_stiffening = 30.0f;
     view.physics.membrane_bending_Nm = 2e-3f;  // Strong enough to show.
@@ -35,7 +36,7 @@ class ReferenceEnergy : public testing::Test {
   }
 };
 
-TEST_F(ReferenceEnergy, GradientIsTheSlopeOfTheEnergy) {
+TEST_P(ReferenceEnergy, GradientIsTheSlopeOfTheEnergy) {
   ElasticEnergy energy(Model());
   energy.CutEdge(3 * 700 + 1);
   const Points x = Shaken(energy.model(), 3e-4, 1);
@@ -49,7 +50,7 @@ TEST_F(ReferenceEnergy, GradientIsTheSlopeOfTheEnergy) {
   }
 }
 
-TEST_F(ReferenceEnergy, HessianIsTheSlopeOfTheGradient) {
+TEST_P(ReferenceEnergy, HessianIsTheSlopeOfTheGradient) {
   const ElasticEnergy energy(Model());
   const Points x = Shaken(energy.model(), 3e-4, 1), d = Direction(energy.model(), 2);
   const SparseMatrix H = energy.Hessian(x, false);
@@ -62,7 +63,7 @@ TEST_F(ReferenceEnergy, HessianIsTheSlopeOfTheGradient) {
   EXPECT_LT((slope - product).norm(), 1e-6 * product.norm());
 }
 
-TEST_F(ReferenceEnergy, TheClampedHessianIsPositiveAndTheSameWhereNothingIsClamped) {
+TEST_P(ReferenceEnergy, TheClampedHessianIsPositiveAndTheSameWhereNothingIsClamped) {
   const ElasticEnergy energy(Model());
   const Points wild = Shaken(energy.model(), 3e-3, 1);
   const SparseMatrix clamped = energy.Hessian(wild, true), plain = energy.Hessian(wild, false);
@@ -76,13 +77,21 @@ TEST_F(ReferenceEnergy, TheClampedHessianIsPositiveAndTheSameWhereNothingIsClamp
   EXPECT_LT(lowest, 0);  // Clamping removed negative curvature in some direction.
 }
 
-TEST_F(ReferenceEnergy, RotationsCostNothingAndRestIsFreeOfForce) {
+TEST_P(ReferenceEnergy, RotationsCostNothingAndRestIsFreeOfForce) {
   ElasticModel model = Model();
   model.gravity.setZero();
   model.load.clear();
   model.hinges.clear();  // They keep the orientation of the rest shape, see their comment.
+  // Removes the prestrain.
   for (ElasticSpring& spring : model.springs) {
-    spring.rest_length *= 1.04f;  // Removes the prestrain.
+    spring.rest_length *= 1.04f;
+  }
+  for (ElasticTriangle& triangle : model.triangles) {
+    std::array<double, 3> lengths{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      lengths[i] = model.springs[triangle.edges[i]].rest_length;
+    }
+    triangle.rest = RestOfTriangle(lengths, 150);
   }
   const ElasticEnergy energy(model);
   const Points x = RestPoints(model);
@@ -94,9 +103,10 @@ TEST_F(ReferenceEnergy, RotationsCostNothingAndRestIsFreeOfForce) {
   EXPECT_GT(energy.Energy(1.01 * x), 1e-4);
 }
 
-TEST_F(ReferenceEnergy, AnAffineStretchOfTheOrganCostsTheLaw) {
+TEST_P(ReferenceEnergy, AnAffineStretchOfTheOrganCostsTheLaw) {
   ElasticModel model = Model();
   model.springs.clear();
+  model.triangles.clear();
   model.hinges.clear();
   model.bindings.clear();
   model.load.clear();
@@ -110,7 +120,7 @@ TEST_F(ReferenceEnergy, AnAffineStretchOfTheOrganCostsTheLaw) {
   EXPECT_NEAR(energy.Energy(x), psi * OrganVolume(model, RestPoints(model)), 1e-9 * energy.Energy(x));
 }
 
-TEST_F(ReferenceEnergy, EquilibriumIsWhereDynamicsComeToRest) {
+TEST_P(ReferenceEnergy, EquilibriumIsWhereDynamicsComeToRest) {
   ElasticModel model = Model();
   model.stiffening = 0;
   model.damping_per_s = 300;
@@ -127,6 +137,26 @@ TEST_F(ReferenceEnergy, EquilibriumIsWhereDynamicsComeToRest) {
   EXPECT_GT(moved, 1e-3);
   EXPECT_LT((dynamics.x() - still.x).norm(), 0.01 * moved);
 }
+
+/// An edge that is cut takes its two triangles with it; what is left of their edges acts as springs, and nothing holds
+/// the two sides together any more.
+TEST_P(ReferenceEnergy, ACutLeavesTheEdgesAroundIt) {
+  ElasticEnergy energy(Model());
+  const Index cols = energy.model().springs[1].b - energy.model().springs[1].a;
+  const std::size_t node = 30 * cols + 7, edge = 3 * node + 2;
+  const Points x = Shaken(energy.model(), 3e-4, 1);
+  const double whole = energy.Energy(x);
+  energy.CutEdge(edge);
+  const double cut = energy.Energy(x);
+  EXPECT_LT(cut, whole);
+  energy.CutEdge(edge);
+  EXPECT_EQ(energy.Energy(x), cut) << "An edge is cut once.";
+}
+
+INSTANTIATE_TEST_SUITE_P(Models, ReferenceEnergy, testing::Values(MembraneModel::kSprings, MembraneModel::kContinuum),
+                         [](const auto& model) {
+                           return std::string(model.param == MembraneModel::kSprings ? "Springs" : "Continuum");
+                         });
 
 }  // namespace
 }  // namespace fulcrum::physics::reference

@@ -163,6 +163,7 @@ StandardCase::StandardCase(scene::SceneData data, const StandardCaseSettings& se
   physics.membrane_Et_N_per_m = 300;
   physics.membrane_prestrain = 0.04f;
   physics.membrane_stiffening = 0;
+  physics.membrane_model = settings.membrane;
   view_ = data_.View();
   model_ = BuildElasticModel(view_);
   const int rows = static_cast<int>(view_.membrane.rows), cols = static_cast<int>(view_.membrane.cols);
@@ -249,6 +250,10 @@ std::uint64_t StandardCase::Hash() const {
     hash.AddValue(s.rest_length);
     hash.AddValue(s.axial);
   }
+  for (const ElasticTriangle& triangle : model_.triangles) {
+    hash.AddValue(triangle.rest.stiffness);
+    add(triangle.rest.trace);
+  }
   for (const ElasticHinge& h : model_.hinges) {
     hash.AddValue(h.v[0]);
     hash.AddValue(h.stiffness);
@@ -274,7 +279,8 @@ std::uint64_t StandardCase::Hash() const {
 }
 
 StandardCase::Reference StandardCase::LoadReference(const std::filesystem::path& folder) const {
-  const std::filesystem::path file = folder / (std::string(view_.name) + ".reference");
+  const char* const model = settings_.membrane == MembraneModel::kSprings ? ".springs" : "";
+  const std::filesystem::path file = folder / (std::string(view_.name) + model + ".reference");
   Reference result;
   if (!Read(file, Hash(), static_cast<Eigen::Index>(model_.mass.size()), &result)) {
     std::fprintf(stderr, "computing %s\n", file.c_str());

@@ -25,6 +25,7 @@ struct StandardCaseSettings {
   int patch_rows = 15, patch_cols = 5;  ///< 75 particles.
   double lift_m = 0.030;
   int slit_rows = 150, slit_offset_cols = 6;  ///< The cut: 2 edges a row, this many columns from the middle.
+  MembraneModel membrane = MembraneModel::kContinuum;
 };
 inline constexpr StandardCaseSettings kBuiltInCase{};
 class StandardCase {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "services/scene/builder/build.h"
+#include "tests/numerics/physics/accurate_under_test.h"
 #include "tests/numerics/physics/paper_solver.h"
 #include "tests/numerics/physics/reference/explicit_dynamics.h"
 
@@ -133,6 +134,16 @@ TEST_F(StandardCaseTest, TheTruthHasNoError) {
   EXPECT_LT(run.errors.hold, 0.05);  // The tissue still oscillates.
   EXPECT_EQ(run.frame_ms.size(), 100u);
   EXPECT_EQ(run.cut_frame_ms.size(), 25u);
+}
+
+TEST_F(StandardCaseTest, ModeAccurateIsNear) {
+  const StandardRun run = RunStandardCase(
+      *standard_, *truth_, [](const SceneView& scene) { return std::make_unique<AccurateUnderTest>(scene); },
+      standard_->scene(), true);
+  EXPECT_LT(run.errors.hold, 0.03);
+  EXPECT_LT(run.errors.force, 0.01);
+  EXPECT_LT(run.errors.pull, 0.05);
+  EXPECT_LT(run.errors.cut, 0.1);
 }
 
 TEST_F(StandardCaseTest, ThePaperModeIsFarOff) {

@@ -124,7 +124,7 @@ TEST_F(OnSmallScene, ASheetCutInManyPlacesComesToRest) {
       late = i >= 350 ? std::max(late, step) : late;
     }
     EXPECT_GT(early, 0.0005f) << seed;  // The slits gape.
-    EXPECT_LT(early, 0.0015f) << seed;  // No shred is thrown about.
+    EXPECT_LT(early, 0.002f) << seed;   // No shred is thrown about.
     EXPECT_LT(late, 1e-5f) << seed;     // Later no shred swings.
   }
 }

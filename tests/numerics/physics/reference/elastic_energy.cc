@@ -92,7 +92,15 @@ Points RestPoints(const ElasticModel& model) {
   return x;
 }
 
-ElasticEnergy::ElasticEnergy(ElasticModel model) : model_(std::move(model)) { BuildRuns(); }
+ElasticEnergy::ElasticEnergy(ElasticModel model) : model_(std::move(model)), triangles_of_(TrianglesOfEdges(model_)) {
+  for (const ElasticSpring& spring : model_.springs) {
+    whole_axial_.push_back(spring.axial);
+  }
+  BuildRuns();
+  for (std::size_t edge = 0; edge < model_.springs.size() && !model_.triangles.empty(); ++edge) {
+    RefreshSpring(edge);
+  }
+}
 
 void ElasticEnergy::BuildRuns() {
   std::vector<std::size_t> order;
@@ -124,10 +132,56 @@ void ElasticEnergy::BuildRuns() {
   plane_.resize(6 * static_cast<std::size_t>(particle_count()));
 }
 
-void ElasticEnergy::CutEdge(std::size_t edge) {
-  model_.springs[edge].axial = 0;
+void ElasticEnergy::RefreshSpring(std::size_t edge) {
+  const std::vector<std::size_t>& triangles = triangles_of_[edge];
+  std::size_t open = 0;
+  for (const std::size_t t : triangles) {
+    open += model_.triangles[t].rest.stiffness > 0 ? 0 : 1;
+  }
+  const double axial = triangles.empty()
+                           ? whole_axial_[edge]
+                           : whole_axial_[edge] * static_cast<double>(open) / static_cast<double>(triangles.size());
+  model_.springs[edge].axial = axial;
   if (place_[edge] < axial_.size()) {
-    axial_[place_[edge]] = 0;
+    axial_[place_[edge]] = axial;
+  }
+}
+
+void ElasticEnergy::CutEdge(std::size_t edge) {
+  whole_axial_[edge] = 0;
+  for (const std::size_t t : triangles_of_[edge]) {
+    model_.triangles[t].rest = {};
+    for (const std::size_t other : model_.triangles[t].edges) {
+      RefreshSpring(other);
+    }
+  }
+  RefreshSpring(edge);
+}
+
+Vec3d ElasticEnergy::Along(std::size_t edge, const Points& x) const {
+  return x.col(model_.springs[edge].b) - x.col(model_.springs[edge].a);
+}
+
+TriangleTerms ElasticEnergy::TermsOf(const ElasticTriangle& triangle, const Points& x,
+                                     TriangleCoupling coupling) const {
+  std::array<double, 3> squares{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    squares[i] = Along(triangle.edges[i], x).squaredNorm();
+  }
+  return EvaluateTriangle(triangle.rest, model_.triangle_stiffening(), squares, coupling);
+}
+
+void ElasticEnergy::TriangleGradient(const Points& x, Points* gradient) const {
+  for (const ElasticTriangle& triangle : model_.triangles) {
+    if (triangle.rest.stiffness > 0) {
+      const TriangleTerms terms = TermsOf(triangle, x, TriangleCoupling::kForce);
+      for (std::size_t i = 0; i < 3; ++i) {
+        const ElasticSpring& edge = model_.springs[triangle.edges[i]];
+        const Vec3d force = terms.tension[static_cast<Eigen::Index>(i)] * Along(triangle.edges[i], x);
+        gradient->col(edge.a) -= force;
+        gradient->col(edge.b) += force;
+      }
+    }
   }
 }
 
@@ -136,7 +190,12 @@ double ElasticEnergy::Energy(const Points& x) const {
   for (const ElasticSpring& s : model_.springs) {
     if (s.axial > 0) {
       const double e = (x.col(s.b) - x.col(s.a)).norm() / s.rest_length - 1;
-      energy += s.axial * s.rest_length * (e * e / 2 + model_.stiffening * e * e * e * e / 4);
+      energy += s.axial * s.rest_length * (e * e / 2 + model_.spring_stiffening() * e * e * e * e / 4);
+    }
+  }
+  for (const ElasticTriangle& triangle : model_.triangles) {
+    if (triangle.rest.stiffness > 0) {
+      energy += TermsOf(triangle, x, TriangleCoupling::kForce).energy;
     }
   }
   for (const ElasticHinge& h : model_.hinges) {
@@ -187,7 +246,7 @@ void ElasticEnergy::SpringGradient(const Points& x, Points* gradient) const {
   for (const SpringRun& run : runs_) {
     double* const f = spring_force_.data();
     SpringForces(p[0] + run.first, p[1] + run.first, p[2] + run.first, run.offset, rest_length_.data() + run.begin,
-                 axial_.data() + run.begin, model_.stiffening, run.count, f, f + run.count, f + 2 * run.count);
+                 axial_.data() + run.begin, model_.spring_stiffening(), run.count, f, f + run.count, f + 2 * run.count);
     for (int axis = 0; axis < 3; ++axis) {
       double* __restrict__ tail = g[axis] + run.first;
       const double* __restrict__ force = spring_force_.data() + static_cast<std::size_t>(axis) * run.count;
@@ -225,6 +284,7 @@ void ElasticEnergy::OrganGradient(const Points& x, Points* gradient) const {
 void ElasticEnergy::Gradient(const Points& x, Points* gradient) const {
   gradient->resize(3, x.cols());
   SpringGradient(x, gradient);
+  TriangleGradient(x, gradient);
   for (const ElasticHinge& h : model_.hinges) {
     Vec3d sum = Vec3d::Zero();
     for (std::size_t i = 0; i < 4; ++i) {
@@ -266,13 +326,35 @@ SparseMatrix ElasticEnergy::Hessian(const Points& x, bool positive) const {
     }
     const Vec3d d = x.col(s.b) - x.col(s.a);
     const double length = std::max(d.norm(), 1e-12), e = length / s.rest_length - 1;
-    const double tension = s.axial * e * (1 + model_.stiffening * e * e);
-    const double along = s.axial * (1 + 3 * model_.stiffening * e * e) / s.rest_length;
+    const double tension = s.axial * e * (1 + model_.spring_stiffening() * e * e);
+    const double along = s.axial * (1 + 3 * model_.spring_stiffening() * e * e) / s.rest_length;
     const double across = positive ? std::max(tension, 0.0) / length : tension / length;
     const Mat3d H = LengthHessian(d / length, along, across);
     AddBlock(s.a, s.a, H, &out);
     AddBlock(s.b, s.b, H, &out);
     AddBlock(std::max(s.a, s.b), std::min(s.a, s.b), -H, &out);
+  }
+  for (const ElasticTriangle& triangle : model_.triangles) {
+    if (triangle.rest.stiffness > 0) {
+      const TriangleTerms terms = TermsOf(triangle, x, positive ? TriangleCoupling::kBound : TriangleCoupling::kExact);
+      // Each edge's ends, and what moving an end does to the edge.
+      for (std::size_t i = 0; i < 3; ++i) {
+        const ElasticSpring& p = model_.springs[triangle.edges[i]];
+        const Vec3d along = Along(triangle.edges[i], x);
+        for (std::size_t j = 0; j < 3; ++j) {
+          const auto ii = static_cast<Eigen::Index>(i), jj = static_cast<Eigen::Index>(j);
+          const ElasticSpring& q = model_.springs[triangle.edges[j]];
+          Mat3d block = terms.coupling(ii, jj) * along * Along(triangle.edges[j], x).transpose();
+          if (i == j) {
+            block += (positive ? std::max(terms.tension[ii], 0.0) : terms.tension[ii]) * Mat3d::Identity();
+          }
+          AddBlock(p.a, q.a, block, &out);
+          AddBlock(p.b, q.b, block, &out);
+          AddBlock(p.a, q.b, -block, &out);
+          AddBlock(p.b, q.a, -block, &out);
+        }
+      }
+    }
   }
   for (const ElasticHinge& h : model_.hinges) {
     for (std::size_t i = 0; i < 4; ++i) {

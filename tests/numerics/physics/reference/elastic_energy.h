@@ -20,7 +20,7 @@ class ElasticEnergy {
 
   [[nodiscard]] const ElasticModel& model() const { return model_; }
   [[nodiscard]] Eigen::Index particle_count() const { return static_cast<Eigen::Index>(model_.mass.size()); }
-  /// Removes the spring of membrane edge 3 * node + direction.
+  /// Removes membrane edge 3 * node + direction: its spring, and the triangles that it is in.
   void CutEdge(std::size_t edge);
 
   /// Elastic energy, and potential of gravity and of the dead load [J].
@@ -40,10 +40,18 @@ class ElasticEnergy {
   };
 
   void BuildRuns();
+  /// Its springs' part of an edge, by the triangles that are whole.
+  void RefreshSpring(std::size_t edge);
+  void TriangleGradient(const Points& x, Points* gradient) const;
+  [[nodiscard]] TriangleTerms TermsOf(const ElasticTriangle& triangle, const Points& x,
+                                      TriangleCoupling coupling) const;
+  [[nodiscard]] Vec3d Along(std::size_t edge, const Points& x) const;
   void SpringGradient(const Points& x, Points* gradient) const;
   void OrganGradient(const Points& x, Points* gradient) const;
 
   ElasticModel model_;
+  std::vector<double> whole_axial_;                     ///< By edge: [N]; 0 where cut.
+  std::vector<std::vector<std::size_t>> triangles_of_;  ///< By edge.
   std::vector<SpringRun> runs_;
   std::vector<double> rest_length_, axial_;           ///< In the order of the runs.
   std::vector<std::size_t> place_;                    ///< Index of each spring of the model in that order.
