@@ -112,7 +112,8 @@ struct ElasticModel {
   double damping_per_s = 0;
   Vec3d gravity = Vec3d::Zero();
 
-  /// c of the springs. Those of opened triangles do not stiffen: on an edge of next to no length it would have no bound.
+  /// c of the springs. Those of opened triangles do not stiffen: on an edge of next to no length it would have no
+  /// bound.
   [[nodiscard]] double spring_stiffening() const { return triangles.empty() ? stiffening : 0; }
   /// b of the triangles.
   [[nodiscard]] double triangle_stiffening() const { return stiffening / 6; }

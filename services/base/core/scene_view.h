@@ -55,7 +55,7 @@ struct PhysicsParams {
   float grasp_open_rad = 0.45f;   ///< … and opens above this one.
   float grip_force_N = 8.0f;      ///< The grasp slips above this traction.
   /// Principal stretch at which the membrane tears; 0: never. Porcine mesentery and peritoneum fail at 1.77 to 3.18;
-  /// the built-in scene's script reaches 2.72 beside the jaws.
+  /// the built-in scene's script reaches 2.24 beside the jaws.
   float tear_stretch = 3.1f;
 };
 

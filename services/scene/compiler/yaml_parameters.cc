@@ -54,9 +54,8 @@ void ReadPhysics(StrictMap map, PhysicsParams* p) {
   ReadSi(&map, "k_binding", Range::Between(0, 1), &p->k_binding);
   ReadSi(&map, "tube_youngs_modulus_kPa", Range::Between(0.001, 1e6), &p->tube_youngs_modulus_Pa);
   ReadSi(&map, "tube_poisson", Range::Between(0, 0.495), &p->tube_poisson);
-  p->membrane_model =
-      map.Choice("membrane_model", p->membrane_model,
-                 {{"springs", MembraneModel::kSprings}, {"continuum", MembraneModel::kContinuum}});
+  p->membrane_model = map.Choice("membrane_model", p->membrane_model,
+                                 {{"springs", MembraneModel::kSprings}, {"continuum", MembraneModel::kContinuum}});
   ReadSi(&map, "membrane_Et_N_per_m", Range::Between(0.001, 1e7), &p->membrane_Et_N_per_m);
   ReadSi(&map, "membrane_stiffening", Range::Between(0, 1000), &p->membrane_stiffening);
   ReadSi(&map, "membrane_prestrain", Range::Between(0, 0.5), &p->membrane_prestrain);

@@ -15,8 +15,8 @@ struct BarErrors {
 /// ed.), article 94, eq. (f): w = q/2E (z^2 - l^2 + nu (x^2 + y^2)), u = -nu q x z / E, with the weight q per volume.
 [[nodiscard]] BarErrors HangingBar(int n, double poisson);
 
-/// A membrane of springs hung by its upper edge under its own weight: the drop at distance s is m g (s l - s^2 / 2) / (E t). RMS
-/// error over the sheet, also between the nodes, over the RMS drop.
+/// A membrane of springs hung by its upper edge under its own weight: the drop at distance s is m g (s l - s^2 / 2) /
+/// (E t). RMS error over the sheet, also between the nodes, over the RMS drop.
 [[nodiscard]] double HangingSheet(int n);
 
 /// A thick-walled tube under inner pressure p in plane strain (Lame 1852; Timoshenko and Goodier, article 28):
