@@ -203,14 +203,15 @@ FULCRUM_INLINE void LineariseRow(const Sheet& sheet, const Inertia& inertia, con
                                  const SheetMatrix& matrix, const float* above, float* below, bool stores, int row) {
   const std::size_t start = RowStart(sheet, row), stride = kLanes * static_cast<std::size_t>(sheet.slots),
                     down_by = Below(sheet, row);
-  const auto linearise = [&]<class F>(int d, const V<F>& vector, std::size_t node) FULCRUM_INLINE_LAMBDA {
-    if constexpr (!springs) {
-      return Linear<F>{vector, F::All(0), F::All(0), F::All(0)};
-    } else {
-      return LineariseEdge<F>(vector, F::Load(sheet.inverse_rest[d] + node), F::Load(sheet.axial[d] + node),
-                              F::All(sheet.stiffening));
-    }
-  };
+  const auto linearise = [&]<class F>([[maybe_unused]] int d, const V<F>& vector, [[maybe_unused]] std::size_t node)
+                             FULCRUM_INLINE_LAMBDA {
+                               if constexpr (!springs) {
+                                 return Linear<F>{vector, F::All(0), F::All(0), F::All(0)};
+                               } else {
+                                 return LineariseEdge<F>(vector, F::Load(sheet.inverse_rest[d] + node),
+                                                         F::Load(sheet.axial[d] + node), F::All(sheet.stiffening));
+                               }
+                             };
   const auto add = []<class F>(Linear<F>* edge, F tension, F along) FULCRUM_INLINE_LAMBDA {
     edge->tension = edge->tension + tension;
     edge->kt = edge->kt + Max(tension, F::All(0));
