@@ -183,14 +183,6 @@ void AddBindings(const TissueScene& scene, ElasticModel* model) {
   }
 }
 
-/// Share of its axial stiffness that an edge has as a spring, by the triangles that it is in.
-double ShareOfSprings(const ElasticModel& model, const std::vector<std::size_t>& triangles) {
-  const auto open = [&](std::size_t t) { return !(model.triangles[t].rest.stiffness > 0); };
-  return triangles.empty() ? 1.0
-                           : static_cast<double>(std::count_if(triangles.begin(), triangles.end(), open)) /
-                                 static_cast<double>(triangles.size());
-}
-
 /// The load balances the membrane in the rest shape; organ, hinges and bindings are free of force there.
 void AddLoad(ElasticModel* model) {
   model->load.assign(model->rest_position.size(), Vec3d::Zero());
@@ -235,6 +227,13 @@ std::vector<std::vector<std::size_t>> TrianglesOfEdges(const ElasticModel& model
     }
   }
   return of;
+}
+
+double ShareOfSprings(const ElasticModel& model, const std::vector<std::size_t>& triangles) {
+  const auto open = [&](std::size_t t) { return !(model.triangles[t].rest.stiffness > 0); };
+  return triangles.empty() ? 1.0
+                           : static_cast<double>(std::count_if(triangles.begin(), triangles.end(), open)) /
+                                 static_cast<double>(triangles.size());
 }
 
 ElasticModel BuildElasticModel(const TissueScene& scene) {

@@ -128,6 +128,9 @@ struct ElasticModel {
 /// Triangles that an edge is in, up to two; less at the rim.
 [[nodiscard]] std::vector<std::vector<std::size_t>> TrianglesOfEdges(const ElasticModel& model);
 
+/// Share of its axial stiffness that an edge has as a spring: that of its `triangles` that are open.
+[[nodiscard]] double ShareOfSprings(const ElasticModel& model, const std::vector<std::size_t>& triangles);
+
 /// Fills patches, patch_links and shear_links from rest_position, tets and mu_Pa; BuildElasticModel does so too.
 void AddOrganPatches(ElasticModel* model);
 

@@ -133,14 +133,7 @@ void ElasticEnergy::BuildRuns() {
 }
 
 void ElasticEnergy::RefreshSpring(std::size_t edge) {
-  const std::vector<std::size_t>& triangles = triangles_of_[edge];
-  std::size_t open = 0;
-  for (const std::size_t t : triangles) {
-    open += model_.triangles[t].rest.stiffness > 0 ? 0 : 1;
-  }
-  const double axial = triangles.empty()
-                           ? whole_axial_[edge]
-                           : whole_axial_[edge] * static_cast<double>(open) / static_cast<double>(triangles.size());
+  const double axial = whole_axial_[edge] * ShareOfSprings(model_, triangles_of_[edge]);
   model_.springs[edge].axial = axial;
   if (place_[edge] < axial_.size()) {
     axial_[place_[edge]] = axial;
