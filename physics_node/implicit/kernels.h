@@ -39,10 +39,10 @@ struct Sheet {
   /// Model continuum: a and alpha of a cell's triangles (energy/triangle_energy.h) [J], [1/m^2]; null: springs alone.
   const float* triangle[2];
   const float* trace[2][3];
-  float triangle_stiffening;            ///< b
-  const unsigned char* springs_in_row;  ///< [rows] 0: no edge of the row is a spring.
-  const float* w;                       ///< Inverse mass in effect [1/kg]; 0: the node does not move.
-  const float* mass;                    ///< [kg]
+  float triangle_stiffening;  ///< b
+  const int* springs_in_row;  ///< [rows] Edges that are springs.
+  const float* w;             ///< Inverse mass in effect [1/kg]; 0: the node does not move.
+  const float* mass;          ///< [kg]
 };
 
 /// One substep's constants. Backward Euler with drag: a particle resists a correction d with mass * inertia * d.

@@ -36,7 +36,6 @@ SheetEdges::SheetEdges(const ImplicitModel& model, const TissueModel& tissue) : 
     for (std::size_t d = 0; d < 3; ++d) {
       spring_[d] = FloatArray(plane);
     }
-    springs_of_row_.assign(model.grid.rows, 0);
     springs_in_row_.assign(model.grid.rows, 0);
   }
   for (std::uint32_t row = 0; row < model.grid.rows; ++row) {
@@ -140,8 +139,7 @@ void SheetEdges::UpdateSpring(Index row, Index col, std::size_t direction) {
   const bool before = spring > 0.0f;
   spring = triangles > 0 ? axial_[direction][at] * open / triangles : axial_[direction][at];
   if (before != (spring > 0.0f)) {
-    springs_of_row_[row] += before ? -1 : 1;
-    springs_in_row_[row] = springs_of_row_[row] > 0 ? 1 : 0;
+    springs_in_row_[row] += before ? -1 : 1;
   }
 }
 

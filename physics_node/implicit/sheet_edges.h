@@ -53,8 +53,7 @@ class SheetEdges {
   std::array<FloatArray, 3> spring_;
   std::array<FloatArray, 2> triangle_;
   std::array<std::array<FloatArray, 3>, 2> trace_;
-  std::vector<int> springs_of_row_;
-  std::vector<std::uint8_t> springs_in_row_;
+  std::vector<int> springs_in_row_;
   std::vector<int> missing_;  ///< By place in a plane: edges that a node has lost to cuts.
   std::vector<ParticleRef> frayed_nodes_;
   std::vector<FrayedEdge> frayed_edges_;
