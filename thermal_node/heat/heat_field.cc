@@ -71,9 +71,11 @@ void HeatField::MarkNeighboursStale(const Tile& tile) {
 
 void HeatField::RebuildStaleFaces() {
   for (Tile* tile : awake_) {
-    if (!std::exchange(tile->material_stale, false)) continue;
+    // Cells begin and cease to boil without a change of the material; see CellResistance.
+    const bool may_boil = tile->has_front || tile->theta_max >= kFrontTheta * material_.theta_boil;
+    if (!std::exchange(tile->material_stale, false) && !may_boil) continue;
     tile->faces_stale = true;
-    ComputeConductivity(tile);
+    ComputeResistance(tile);
   }
   for (Tile* tile : awake_) {
     if (std::exchange(tile->faces_stale, false)) BuildFaces(tile);

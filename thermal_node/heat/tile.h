@@ -30,6 +30,10 @@ inline constexpr int FaceT(int i, int j) { return (j + 1) * kTile + i; }
 inline constexpr int kCornerStride = kTile + 8;
 inline constexpr int Corner(int i, int j) { return j * kCornerStride + i; }
 
+/// Conductance of a diagonal link along the main diagonal (stored with positive sign) and the antidiagonal (negative).
+[[gnu::always_inline]] inline float Main(float link) { return link > 0.0f ? link : 0.0f; }
+[[gnu::always_inline]] inline float Anti(float link) { return link < 0.0f ? -link : 0.0f; }
+
 template <class T>
 using CellArray = std::array<T, kTileCells>;
 
@@ -55,6 +59,15 @@ struct TileGeometry {
   std::vector<float> shear;                                       ///< sqrt(g) g^st at Corner; empty: none.
 };
 
+/// Thermal resistance of half a cell times conductance of a cell's length, by the water of the neighbour [m K/W];
+/// infinite where there is no tissue. It differs by side only in a cell that boils: there theta is that of the front
+/// between dry and wet tissue, and the front divides the cell as its water does.
+struct CellResistance {
+  alignas(64) std::array<float, kThetaCount> water{};
+  alignas(64) std::array<float, kThetaCount> to_drier{};   ///< To the face of a neighbour with less water.
+  alignas(64) std::array<float, kThetaCount> to_wetter{};  ///< To the face of any other one.
+};
+
 struct Tile {
   TileState state;
   int tx = 0, ty = 0, index = 0;
@@ -63,8 +76,8 @@ struct Tile {
 
   /// theta [K] with a halo; equals enthalpy / heat capacity at all times between calls.
   alignas(64) std::array<float, kThetaCount> theta{};
-  /// Thermal conductivity with a halo [W/mK]; 0 where there is no tissue.
-  alignas(64) std::array<float, kThetaCount> conductivity{};
+  /// What a cell adds to the resistance of its faces, with a halo.
+  CellResistance resistance;
   /// Conductance over flat_volume of the face between cells (i-1, j) and (i, j), at FaceS [W/(K m^3)].
   alignas(64) std::array<float, kTile * kFaceStride> face_s{};
   /// The same between (i, j-1) and (i, j), at FaceT.
@@ -72,6 +85,9 @@ struct Tile {
   /// The same between cells that touch at a corner, at Corner; above 0 between (i-1, j-1) and (i, j), below 0, minus
   /// that between (i, j-1) and (i-1, j). Empty without shear.
   std::vector<float> links;
+  /// 1 where the flux of a face may be of fourth order, 0 near a front of boiling or a border between dry and wet
+  /// tissue, where the slope of theta changes; like face_s and face_t. Empty: 1 everywhere.
+  std::vector<float> smooth_s, smooth_t;
   alignas(64) CellArray<float> before{};     ///< Enthalpy at the beginning of the step [J/m^3].
   alignas(64) CellArray<float> cell_rate{};  ///< Rate of the explicit step with two-point fluxes in each cell [1/s].
   alignas(64) std::array<float, kTile> theta_sum{};  ///< Column sums of theta times area.
@@ -81,6 +97,7 @@ struct Tile {
   int substeps = 0;            ///< Substeps of the tile's island in the last step.
   bool material_stale = true;  ///< Conductivities have changed.
   bool faces_stale = true;     ///< Conductances of faces must be recomputed.
+  bool has_front = false;      ///< A cell boiled when the conductivities were computed.
   bool patch_stale = true;     ///< Changed since it was last drawn into a patch.
   bool held = false;           ///< A warm neighbour touches the tile: it must not sleep in this step.
 

@@ -213,6 +213,62 @@ double SphereError(float cell_m, float dt_s) {
   return problem.Error(0.24);
 }
 
+double StefanError(float cell_m) {
+  constexpr double kWall_K = 350, kTime_s = 1;
+  ThermalParams params;
+  params.cell_m = cell_m;
+  params.h_top_W_m2K = params.h_below_W_m2K = params.h_tented_W_m2K = params.perfusion_per_s = 0;
+  const Material material = MakeMaterial(params);
+  HeatField field(MakeFlatSheet(kLength, kTile * cell_m, cell_m), material);
+  Fill(&field, [](double, double) { return 0.0; });
+  Ledger ledger;
+  // The wall stands between the first two columns: each cell of the first is dry and so hot that the flux to its
+  // neighbour is that from a wall.
+  const auto hold_wall = [&] {
+    for (int ty = 0; ty < field.sheet().tiles_y; ++ty) {
+      Tile* tile = field.Wake(0, ty);
+      for (int j = 0; j < kTile; ++j) {
+        const double theta = tile->theta[ThetaIndex(1, j)];
+        const double ratio = 0.5 / (material.k_dry * tile->resistance.to_drier[ThetaIndex(1, j)]);
+        const double beyond = theta + (kWall_K - theta) * (1 + ratio);
+        tile->state.enthalpy[j * kTile] = static_cast<float>(beyond * material.rc_dry);
+      }
+      field.RefreshTheta(tile, &ledger);
+    }
+  };
+  for (int ty = 0; ty < field.sheet().tiles_y; ++ty) {
+    Tile* tile = field.Find(0, ty);
+    for (int j = 0; j < kTile; ++j) tile->state.water[j * kTile] = 0;
+  }
+  field.Diffuse(1e-6f, &ledger);
+  const auto steps = static_cast<int>(std::lround(kTime_s / (0.05 * static_cast<double>(cell_m * cell_m) / 1e-6)));
+  for (int n = 0; n < steps; ++n) {
+    hold_wall();
+    field.Diffuse(static_cast<float>(kTime_s / steps), &ledger);
+  }
+  double front = -1;
+  for (int tx = 0; tx < field.sheet().tiles_x; ++tx) {
+    for (int i = 0; i < kTile; ++i) front += 1 - static_cast<double>(field.Find(tx, 0)->state.water[i]);
+  }
+  front *= static_cast<double>(cell_m);
+  // Depth is 2 l sqrt(alpha_dry t) where the flux out of the dry part less that into the wet one is the latent heat of
+  // the front's way.
+  const double dry = material.k_dry / material.rc_dry, wet = material.k_wet / material.rc_wet,
+               ratio = std::sqrt(dry / wet);
+  const double boil = material.theta_boil;
+  const auto excess = [&](double l) {
+    return material.k_dry * (kWall_K - boil) * std::exp(-l * l) / (std::erf(l) * std::sqrt(kPi * dry)) -
+           material.k_wet * boil * std::exp(-l * l * ratio * ratio) / (std::erfc(l * ratio) * std::sqrt(kPi * wet)) -
+           static_cast<double>(material.latent) * l * std::sqrt(dry);
+  };
+  double low = 1e-6, high = 3;
+  for (int n = 0; n < 60; ++n) {
+    const double middle = 0.5 * (low + high);
+    (excess(middle) > 0 ? low : high) = middle;
+  }
+  return front / (2 * low * std::sqrt(dry * kTime_s)) - 1;
+}
+
 double TimeOrder() {
   std::vector<std::vector<double>> results;
   for (const float dt : {0.048f, 0.024f, 0.012f}) {

@@ -39,6 +39,12 @@ TEST(HeatTest, CurvedAndShearedSurfaceIsSolvedWithSecondOrder) {
   EXPECT_GE(std::log2(coarse / fine), 1.9);
 }
 
+TEST(HeatTest, FrontOfBoilingFollowsNeumann) {
+  const double coarse = StefanError(2e-4f), fine = StefanError(1e-4f);
+  EXPECT_LT(std::abs(fine), 0.01);
+  EXPECT_GE(std::log2(std::abs(coarse / fine)), 1.5);
+}
+
 TEST(HeatTest, StepIsOfSecondOrderInTime) { EXPECT_GE(TimeOrder(), 1.9); }
 
 TEST(HeatTest, MovingGaussianMatchesTheExactIntegral) {

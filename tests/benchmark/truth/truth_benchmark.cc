@@ -1,21 +1,26 @@
-// The membrane's models against theory (tests/numerics/physics/sheet_cases.h). Minimised by the reference solver: what
-// is left is the error of the model and its mesh, not that of a solver in real time.
+// Models against theory. The membrane (tests/numerics/physics/sheet_cases.h) is minimised by the reference solver: what
+// is left is the error of the model and its mesh, not that of a solver in real time. Heat
+// (tests/numerics/thermal/heat_cases.h) is the product's own solver.
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "tests/benchmark/report.h"
 #include "tests/numerics/physics/sheet_cases.h"
+#include "tests/numerics/thermal/heat_cases.h"
 
-namespace fulcrum::physics {
+namespace fulcrum {
 namespace {
+
+using namespace physics;
 
 /// Cells a radius: 1 mm, as the membrane of built-in has, at 16.
 constexpr int kCells = 16;
 
-void Measure(const std::string& stem, MembraneModel model, benchmark::Report* report) {
+double Order(double coarse, double fine) { return std::log2(std::abs(coarse / fine)); }
+
+void MeasureSheet(const std::string& stem, MembraneModel model, benchmark::Report* report) {
   const auto wants = [&](const char* key) { return report->Wants(stem + key); };
-  const auto order = [](double coarse, double fine) { return std::log2(std::abs(coarse / fine)); };
   if (wants("directional_modulus_pct") || wants("poisson_error")) {
     const DirectionalModuli moduli = MeasureModuli(model);
     report->Add(stem + "directional_modulus_pct", 100 * moduli.modulus_spread, "%");
@@ -32,20 +37,29 @@ void Measure(const std::string& stem, MembraneModel model, benchmark::Report* re
     report->Add(stem + "lift_error_pct", 100 * lift.shape_error, "%");
     report->Add(stem + "lift_force_error_pct", 100 * std::abs(lift.force_error), "%");
     report->Add(stem + "mirror_asymmetry_pct", 100 * lift.asymmetry, "%");
-    report->Add(stem + "lift_order", order(lift.shape_error, LiftDisc(model, 2 * kCells).shape_error), "1");
+    report->Add(stem + "lift_order", Order(lift.shape_error, LiftDisc(model, 2 * kCells).shape_error), "1");
   }
   if (wants("hencky_error_pct") || wants("hencky_order")) {
     const double error = HenckyDisc(model, kCells);
     report->Add(stem + "hencky_error_pct", 100 * std::abs(error), "%");
-    report->Add(stem + "hencky_order", order(error, HenckyDisc(model, 2 * kCells)), "1");
+    report->Add(stem + "hencky_order", Order(error, HenckyDisc(model, 2 * kCells)), "1");
   }
 }
 
+/// A front of boiling in cells of the default 100 um.
+void MeasureStefan(benchmark::Report* report) {
+  if (!report->Wants("truth.stefan.")) return;
+  const double error = thermal::StefanError(1e-4f);
+  report->Add("truth.stefan.front_error_pct", 100 * std::abs(error), "%");
+  report->Add("truth.stefan.order", Order(thermal::StefanError(2e-4f), error), "1");
+}
+
 }  // namespace
-}  // namespace fulcrum::physics
+}  // namespace fulcrum
 
 int main(int argc, char** argv) {
   fulcrum::benchmark::Report report(argc, argv);
-  fulcrum::physics::Measure("truth.sheet.", fulcrum::MembraneModel::kContinuum, &report);
-  fulcrum::physics::Measure("truth.springs.", fulcrum::MembraneModel::kSprings, &report);
+  fulcrum::MeasureSheet("truth.sheet.", fulcrum::MembraneModel::kContinuum, &report);
+  fulcrum::MeasureSheet("truth.springs.", fulcrum::MembraneModel::kSprings, &report);
+  fulcrum::MeasureStefan(&report);
 }
