@@ -92,7 +92,7 @@ struct SolverState {
   TouchedRegions touched;  ///< In the last substep.
   Movement movement;
   std::array<FloatArray, kQueryCount> query_displacement;  ///< Fields: last answers to stiffness queries [m].
-  float largest_correction_m = 0;  ///< In the last substep [m].
+  float largest_correction_m = 0;                          ///< In the last substep [m].
   std::uint32_t steps = 0;
   bool coarse_due = false;  ///< The next part of the coarse matrix is due in this step.
 };

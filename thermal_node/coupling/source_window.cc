@@ -8,7 +8,6 @@
 namespace fulcrum::thermal {
 namespace {
 
-constexpr float kFarFieldSpacing = 0.1f;  ///< Spacing of the table of far_field_, in window widths.
 /// Rows with less than this share of the heat are left out of Change(): their heat density is too low to matter.
 constexpr float kFaintRow = 0.01f;
 /// Longest coupling step in a mode with discharges [s]: cells that boil dry beneath a film are removed only at its end.
@@ -29,15 +28,9 @@ void LoadTissue(const std::uint8_t* __restrict flags, const float* __restrict in
 
 }  // namespace
 
-SourceWindow::SourceWindow(const Material& material, const Sheet& sheet) : material_(material), sheet_(sheet) {
+SourceWindow::SourceWindow(const Material& material, const Sheet& sheet)
+    : material_(material), sheet_(sheet), far_(material) {
   gap_.fill(kFarGap);
-  // Far field of the leaky sheet beyond the window: V ~ K0(r / lambda) with lambda = sqrt(sigma d / leak).
-  const double lambda = std::sqrt(material.sigma * material.thickness_m / std::max(material.leak_S_m2, 1e-3f));
-  for (std::size_t n = 0; n < far_field_.size(); ++n) {
-    const double r = std::max<double>(n, 1) * kFarFieldSpacing * kWindow * material.cell_m;
-    const double x = std::min(r / lambda, 300.0);  // K0 underflows beyond
-    far_field_[n] = static_cast<float>(std::cyl_bessel_k(1.0, x) / std::cyl_bessel_k(0.0, x) / lambda);
-  }
 }
 
 void SourceWindow::Export(State* state) const {
@@ -132,19 +125,22 @@ void SourceWindow::SetGround(const Vec2f& middle, bool tented) {
   for (int k = 0; k < kWindowCells; ++k) problem_.ground[k] = (flags_[k] & kNoTissue) != 0 ? 0.0f : leak;
   // Current that leaves the window: the conductance of the sheet's far field at each face of the border, in series with
   // the half cell before it.
+  far_middle_ = middle;
+  far_tented_ = tented;
+  std::size_t face_count = 0;
   const auto add = [&](int i, int j, float face, float stretch, const Vec2f& normal) {
     const Vec2f r_cells = Vec2f(static_cast<float>(corner_.ix + i + sheet_.origin_x) + 0.5f,
                                 static_cast<float>(corner_.iy + j + sheet_.origin_y) + 0.5f) +
                           0.5f * normal - middle / cell;
-    const float r = std::max(r_cells.norm(), 1.0f);
-    const float x = std::min(r / (kFarFieldSpacing * kWindow), static_cast<float>(far_field_.size()) - 1.001f);
-    const int n = static_cast<int>(x);
-    const float f = x - static_cast<float>(n);
-    const float kappa = tented ? 1.0f / (r * cell * std::log(std::max(kTentRadius_m / (r * cell), 1.2f)))
-                               : far_field_[n] + f * (far_field_[n + 1] - far_field_[n]);
-    const float cosine = std::max(0.0f, r_cells.dot(normal) / r);
+    const float r_m = std::max(r_cells.norm(), 1.0f) * cell;
+    const float kappa = tented ? 1.0f / (r_m * std::log(std::max(kTentRadius_m / r_m, 1.2f))) : far_.SlopeAt(r_m);
+    const float cosine = std::max(0.0f, r_cells.dot(normal) * cell / r_m);
     const float slope = cell * stretch * kappa * cosine;  // relative slope of the potential per cell
-    problem_.ground[j * kWindow + i] += face * problem_.sigma[j * kWindow + i] * slope / (1.0f + 0.5f * slope);
+    const float conductance = face * problem_.sigma[j * kWindow + i] * slope / (1.0f + 0.5f * slope);
+    const float share = tented ? 1.0f : far_.ShareAt(r_m);
+    problem_.ground[j * kWindow + i] += conductance;
+    border_[face_count++] = {static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(j), share * conductance,
+                             (1.0f - share) * conductance};
   };
   const float stretch_s = std::sqrt(metric_.ss), stretch_t = std::sqrt(metric_.tt);
   for (int n = 0; n < kWindow; ++n) {
@@ -374,6 +370,18 @@ void SourceWindow::AddLeak(float v2_s) {
   }
 }
 
+void SourceWindow::AddFar(float v2_s) {
+  double sheet_S = 0, leak_S = 0;
+  for (const BorderFace& face : border_) {
+    const float volts = potential_.Voltage(face.i, face.j);
+    sheet_S += static_cast<double>(face.sheet_S * volts * volts);
+    leak_S += static_cast<double>(face.leak_S * volts * volts);
+  }
+  const double energy = static_cast<double>(v2_s) * solved_.scale;
+  far_J_ += energy * sheet_S;
+  stats_.far_leak_J += energy * leak_S;
+}
+
 void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive, float duration_s, Ledger* ledger) {
   const Vec2f centre = 0.5f * (path.from + path.to);
   const CellIndex middle = sheet_.CellOf(centre);
@@ -435,6 +443,7 @@ float SourceWindow::SolveStep(const Drive& drive, float longest) {
 void SourceWindow::Heat(const Drive& drive, bool tented, float dt_s, Ledger* ledger) {
   const float v2_s = stats_.voltage_V * stats_.voltage_V * dt_s;
   if (keep_leak_ && !tented) AddLeak(v2_s);
+  AddFar(v2_s);
   Deposit(v2_s, drive.remove_theta, ledger);
   const double film = static_cast<double>(v2_s) * solved_.lost_S;
   const double metal = film * static_cast<double>(kMetalShare / (1.0f - kTissueShare));

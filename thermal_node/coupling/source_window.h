@@ -8,6 +8,8 @@
 
 #include <array>
 #include <cstdint>
+#include <utility>
+#include <vector>
 
 #include "services/base/core/footprint.h"
 #include "thermal_node/coupling/electrode.h"
@@ -31,6 +33,30 @@ inline constexpr float kFarGap = 1e6f;  ///< Gap of a cell without metal near it
 inline constexpr CellIndex kNowhere{-(1 << 24), -(1 << 24)};
 /// Radius around the tip beyond which a tented sheet lies on tissue and is at 0 V [m]; assumed.
 inline constexpr float kTentRadius_m = 0.015f;
+
+/// The leaky sheet far from the electrode; distances in metres.
+class FarField {
+ public:
+  explicit FarField(const Material& material);
+  /// -V' / V = K1 / (lambda K0) [1/m].
+  [[nodiscard]] float SlopeAt(float r_m) const { return At(slope_, r_m); }
+  /// Joule heat by volume, in any unit.
+  [[nodiscard]] float DensityAt(float r_m) const { return At(density_, r_m); }
+  /// Of the power that crosses a circle, the share that the sheet beyond it dissipates; the rest is the tissue's
+  /// beneath.
+  [[nodiscard]] float ShareAt(float r_m) const { return At(share_, r_m); }
+  /// Distance within which the heat beyond the window is put [m].
+  [[nodiscard]] float reach_m() const { return reach_m_; }
+
+ private:
+  static constexpr std::size_t kCount = 64;
+  static constexpr float kSpacing = 0.1f;  ///< Of the tables, in window widths.
+  using Table = std::array<float, kCount>;
+  [[nodiscard]] float At(const Table& table, float r_m) const;
+
+  float spacing_, reach_m_ = 0;
+  Table slope_{}, density_{}, share_{};
+};
 
 /// Motion of the metal over a span of time, in material space: from one footprint to the next. Without footprints the
 /// metal is a capsule about the contact's centre with its axis in the sheet.
@@ -57,6 +83,7 @@ struct SourceStats {
   int removed_cells = 0;
   CellIndex low{INT32_MAX, INT32_MAX}, high{INT32_MIN, INT32_MIN};  ///< Box of the removed cells.
   float voltage_V = 0, current_A = 0;                               ///< Electrode, rms, of the last solve.
+  double far_leak_J = 0;                                            ///< Of the tissue beneath, beyond the window.
   float imbalance = 0;                                              ///< Largest PotentialResult::imbalance.
 };
 
@@ -66,6 +93,10 @@ class SourceWindow {
 
   /// Heats the sheet for `duration_s` while the tip moves along the path.
   void Run(HeatField* field, const TipPath& path, const Drive& drive, float duration_s, Ledger* ledger);
+
+  /// Heats the sheet beyond the window by what the current of the last Runs has dissipated there. `hold`: the next
+  /// Diffuse lets none of its tiles sleep, which warm by less a frame than what they sleep below.
+  void DepositFar(HeatField* field, bool hold, Ledger* ledger);
 
   /// Time integral of the squared potential against the tissue beneath, over the last Run [V^2 s]; cell (i, j) of the
   /// window at j * kWindow + i, cell (0, 0) at corner(). 0 where nothing leaks: holes, a tented sheet. Computed only
@@ -130,6 +161,7 @@ class SourceWindow {
   void Heat(const Drive& drive, bool tented, float dt_s, Ledger* ledger);
   void Deposit(float v2_s, float remove_theta, Ledger* ledger);
   void AddLeak(float v2_s);
+  void AddFar(float v2_s);
   void BoilRow(int j, float remove_theta, Ledger* ledger);
   void RemoveDry(int j, float too_hot, Ledger* ledger);
   template <class Visit>
@@ -140,9 +172,18 @@ class SourceWindow {
   PotentialSolver potential_;
   PotentialProblem problem_;
   CellIndex corner_ = kNowhere;
-  float step_s_ = 0;                   ///< Last coupling step [s], the estimate for the length of the next one.
-  SurfaceMetric metric_;               ///< Metric under the tip, used for the whole window.
-  std::array<float, 64> far_field_{};  ///< K1/(lambda K0), tabulated over the distance [1/m].
+  float step_s_ = 0;      ///< Last coupling step [s], the estimate for the length of the next one.
+  SurfaceMetric metric_;  ///< Metric under the tip, used for the whole window.
+  FarField far_;
+  /// Conductance of each face of the window's border to the far field: four times a side.
+  struct BorderFace {
+    std::uint8_t i = 0, j = 0;
+    float sheet_S = 0, leak_S = 0;  ///< The parts whose power heats the sheet and the tissue beneath.
+  };
+  std::array<BorderFace, 4 * kWindow> border_{};
+  double far_J_ = 0;  ///< Heat of the sheet beyond the window since the last DepositFar [J].
+  Vec2f far_middle_ = Vec2f::Zero();
+  bool far_tented_ = false;
   SourceStats stats_;
   bool keep_leak_ = false;
   alignas(64) std::array<float, kWindowCells> leak_V2s_{};

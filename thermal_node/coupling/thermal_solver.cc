@@ -140,8 +140,10 @@ void ThermalSolver::StageTears() {
 void ThermalSolver::AccurateFrame(std::span<const TipInput> tips, float dt_s) {
   source_.ClearStats();
   ApplySource(tips, dt_s, 0.0f, 0.5f);
+  source_.DepositFar(&field_, true, &ledger_);
   figures_.substeps = field_.Diffuse(dt_s, &ledger_);
   ApplySource(tips, dt_s, 0.5f, 1.0f);
+  source_.DepositFar(&field_, false, &ledger_);
   UpdateVolume(dt_s);
   UpdateDamage(dt_s);
   StageTears();

@@ -190,7 +190,7 @@ int HeatField::DiffuseIsland(float dt_s, Ledger* ledger) {
   }
   for (Tile* tile : island_) {
     tile->substeps = substeps;
-    tile->patch_stale = true;
+    tile->patch_stale = tile->patch_stale || std::max(tile->theta_max, -tile->theta_min) > kVisibleTheta;
     tile->faces_stale = tile->faces_stale || stiff;
   }
   return substeps;

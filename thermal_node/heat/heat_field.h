@@ -20,6 +20,8 @@ namespace fulcrum::thermal {
 
 inline constexpr float kWakeTheta = 0.03f;   ///< Temperature at a tile's border that wakes the neighbour [K].
 inline constexpr float kSleepTheta = 0.02f;  ///< A tile sleeps when its largest |theta| is below this [K].
+/// A tile whose |theta| is below this is not drawn again until it sleeps [K]: a texel's step is 0.5 K.
+inline constexpr float kVisibleTheta = 0.25f;
 /// Largest dt * rate of an explicit stage; the maximum principle holds up to 1.
 inline constexpr float kExplicitLimit = 0.98f;
 /// Largest ratio of a fourth-order flux to the two-point flux: that of the shortest wave. Reduced where the step is too

@@ -227,7 +227,8 @@ PotentialResult PotentialSolver::Evaluate(const PotentialProblem& problem) {
   const double out = heat + lost + grounded;
   result.conductance_S = static_cast<float>(in);
   result.imbalance = static_cast<float>(std::abs(in - out) / in);
-  const auto scale = static_cast<float>(in / out);
+  result.scale = in / out;
+  const auto scale = static_cast<float>(result.scale);
   for (float& q : heat_) q *= scale;
   for (float& q : row_heat_) q *= scale;
   result.heat_S = heat * static_cast<double>(scale);

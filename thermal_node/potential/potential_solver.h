@@ -28,6 +28,7 @@ struct PotentialResult {
   float conductance_S = 0;  ///< Electrode current at 1 V.
   double heat_S = 0;        ///< Joule heat in the window at 1 V [W/V^2].
   double lost_S = 0;        ///< Power in the `lost` part of the contact at 1 V [W/V^2].
+  double scale = 1;         ///< Factor of the rescaling of all powers.
   float imbalance = 0;      ///< |power in - heat - lost - power into ground| / power in, before the rescaling.
   int iterations = 0;
 };

@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "tests/benchmark/report.h"
 #include "tests/numerics/physics/sheet_cases.h"
+#include "tests/numerics/thermal/electrode_current.h"
 #include "tests/numerics/thermal/heat_cases.h"
+#include "tests/numerics/thermal/mesentery.h"
 
 namespace fulcrum {
 namespace {
@@ -54,6 +57,25 @@ void MeasureStefan(benchmark::Report* report) {
   report->Add("truth.stefan.order", Order(thermal::StefanError(2e-4f), error), "1");
 }
 
+void MeasureSource(benchmark::Report* report) {
+  using thermal::RiseAtOneMillimetre;
+  if (report->Wants("truth.potential.")) {
+    const thermal::EnergyShares shares = thermal::SharesOfEnergy(thermal::MakeMaterial(ThermalParams{}));
+    report->Add("truth.potential.sheet_energy_pct", 100 * shares.sheet, "%");
+    report->Add("truth.potential.beyond_window_energy_pct", 100 * shares.beyond, "%");
+    report->Add("truth.potential.unaccounted_energy_pct", 100 * std::abs(shares.unaccounted), "%");
+  }
+  if (report->Wants("truth.mesentery.")) {
+    std::vector<double> rises;
+    for (const float cell_m : {4e-5f, 7e-5f, 1e-4f, 2e-4f}) {
+      rises.push_back(RiseAtOneMillimetre({.tented = false, .cell_m = cell_m}));
+    }
+    const auto [least, most] = std::minmax_element(rises.begin(), rises.end());
+    report->Add("truth.mesentery.rise_K", rises[2], "K");
+    report->Add("truth.mesentery.spread_K", *most - *least, "K");
+  }
+}
+
 }  // namespace
 }  // namespace fulcrum
 
@@ -62,4 +84,5 @@ int main(int argc, char** argv) {
   fulcrum::MeasureSheet("truth.sheet.", fulcrum::MembraneModel::kContinuum, &report);
   fulcrum::MeasureSheet("truth.springs.", fulcrum::MembraneModel::kSprings, &report);
   fulcrum::MeasureStefan(&report);
+  fulcrum::MeasureSource(&report);
 }

@@ -113,4 +113,26 @@ double WindowConductance(const Material& material, const CapsuleOnSheet& capsule
   return window.stats().current_A / window.stats().voltage_V;
 }
 
+EnergyShares SharesOfEnergy(const Material& material) {
+  const float side = 20e-3f;
+  HeatField field(MakeFlatSheet(side, side, material.cell_m), material);
+  SourceWindow window(field.material(), field.sheet());
+  window.KeepLeak();
+  TipPath path;
+  path.from = path.to = {0.5f * side, 0.5f * side};
+  path.radius_m = 5e-4f;
+  Ledger ledger;
+  window.Run(&field, path, {.power_W = 30, .v_max_V = 350, .i_max_A = 2, .remove_theta = 1e3f, .arc_m = 4e-4f}, 1e-3f,
+             &ledger);
+  const double within = ledger.joule;
+  window.DepositFar(&field, false, &ledger);
+  double leak_V2s = 0;
+  for (const float of_cell : window.leak_V2s()) leak_V2s += static_cast<double>(of_cell);
+  const double per_cell = static_cast<double>(material.leak_S_m2 * material.cell_m * material.cell_m);
+  const double beneath = leak_V2s * per_cell + window.stats().far_leak_J;
+  const double all = ledger.generator;
+  return {ledger.joule / all, (ledger.joule - within) / all, beneath / all,
+          (all - ledger.joule - ledger.film - beneath) / all};
+}
+
 }  // namespace fulcrum::thermal

@@ -26,4 +26,13 @@ struct CapsuleOnSheet {
 [[nodiscard]] double WindowConductance(const Material& material, const CapsuleOnSheet& capsule, float heading,
                                        const Vec2f& from_node);
 
+/// Where the generator's energy goes, as shares of it: a disc on wet tissue.
+struct EnergyShares {
+  double sheet = 0;        ///< In and beyond the window.
+  double beyond = 0;       ///< The part of `sheet` beyond the window.
+  double beneath = 0;      ///< The tissue beneath.
+  double unaccounted = 0;  ///< Neither these nor the film.
+};
+[[nodiscard]] EnergyShares SharesOfEnergy(const Material& material);
+
 }  // namespace fulcrum::thermal

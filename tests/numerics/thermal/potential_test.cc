@@ -18,6 +18,21 @@ TEST(PotentialTest, CurrentBetweenCirclesIsTheLogarithms) {
   EXPECT_LT(result.heat_error, 0.02);
 }
 
+TEST(PotentialTest, HeatOfTheSheetDoesNotDependOnTheWindow) {
+  // The window is 64 cells wide: 12.8, 6.4 and 3.2 mm.
+  std::array<EnergyShares, 3> shares;
+  for (std::size_t n = 0; n < shares.size(); ++n) {
+    ThermalParams params;
+    params.cell_m = std::array{2e-4f, 1e-4f, 5e-5f}[n];
+    shares[n] = SharesOfEnergy(MakeMaterial(params));
+    EXPECT_LT(std::abs(shares[n].unaccounted), 0.005);
+  }
+  EXPECT_LT(shares[0].beyond, 0.1);
+  EXPECT_GT(shares[2].beyond, 0.2);
+  EXPECT_NEAR(shares[1].sheet, shares[0].sheet, 0.02);
+  EXPECT_NEAR(shares[2].sheet, shares[0].sheet, 0.02);
+}
+
 TEST(PotentialTest, WorkingToleranceKeepsCurrentAndHeat) {
   const RingsResult result = SolveRings(6.3, 29.2, kWorkingTolerance);
   EXPECT_LT(result.current_error, 0.01);
