@@ -1,5 +1,5 @@
 // The linear solve of a substep: conjugate gradients on A d = r with the preconditioner of three levels, truncated
-// after two or three iterations (Hestenes and Stiefel 1952).
+// after a few iterations (Hestenes and Stiefel 1952).
 //
 //   z_0 = M r_0,  p_0 = z_0                     M       preconditioner: blocks, hats, coarse nodes (coarse_space.h)
 //   alpha_i = r_i . z_i / p_i . A p_i           A       K + inertia M at the linearisation point

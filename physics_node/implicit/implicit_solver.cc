@@ -11,9 +11,9 @@ namespace {
 /// Coordinates beyond this count as damaged [m]: far outside of a body, far below what overflows when squared.
 constexpr float kFarthest_m = 10.0f;
 
-/// After a correction above this [m] in a substep at least as long as this [s] the next one takes more iterations, as
-/// when taut tissue is let go: it is back at rest as soon as with an exact solve. With two more the error of a cut
-/// grows; shorter substeps converge without (deploy/docs/measurements/physics, Release).
+/// A substep longer than this [s] after a correction above this [m], as when taut tissue is let go, takes more
+/// iterations: the tissue is back at rest nearly as soon as with an exact solve. With two more the error of a cut grows;
+/// shorter substeps converge without (deploy/docs/measurements/physics, Release).
 constexpr float kLargeCorrection_m = 0.001f, kLongSubstep_s = 0.004f;
 constexpr int kMoreIterations = 4;
 

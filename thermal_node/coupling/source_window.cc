@@ -10,6 +10,8 @@ namespace {
 
 /// Rows with less than this share of the heat are left out of Change(): their heat density is too low to matter.
 constexpr float kFaintRow = 0.01f;
+/// Distance of a contact from the last one from which on the heat beyond the window is put down first [cells]. Assumed.
+constexpr float kFarAway = 8.0f;
 /// Longest coupling step in a mode with discharges [s]: cells that boil dry beneath a film are removed only at its end.
 constexpr float kFilmStep_s = 1.6e-3f;
 /// Maximum number of evaluations of Change() for one step: one more than needed where the change is proportional to the
@@ -115,40 +117,8 @@ void SourceWindow::Store(HeatField* field, bool tented) {
     }
     std::copy_n(&water_[from], count, &tile->state.water[to]);
     std::copy_n(&flags_[from], count, &tile->state.flags[to]);
-    tile->material_stale = true;
+    tile->material_stale = tile->patch_stale = true;
   });
-}
-
-void SourceWindow::SetGround(const Vec2f& middle, bool tented) {
-  const float cell = material_.cell_m;
-  const float leak = tented ? 0.0f : material_.leak_S_m2 * cell * cell * metric_.area();
-  for (int k = 0; k < kWindowCells; ++k) problem_.ground[k] = (flags_[k] & kNoTissue) != 0 ? 0.0f : leak;
-  // Current that leaves the window: the conductance of the sheet's far field at each face of the border, in series with
-  // the half cell before it.
-  far_middle_ = middle;
-  far_tented_ = tented;
-  std::size_t face_count = 0;
-  const auto add = [&](int i, int j, float face, float stretch, const Vec2f& normal) {
-    const Vec2f r_cells = Vec2f(static_cast<float>(corner_.ix + i + sheet_.origin_x) + 0.5f,
-                                static_cast<float>(corner_.iy + j + sheet_.origin_y) + 0.5f) +
-                          0.5f * normal - middle / cell;
-    const float r_m = std::max(r_cells.norm(), 1.0f) * cell;
-    const float kappa = tented ? 1.0f / (r_m * std::log(std::max(kTentRadius_m / r_m, 1.2f))) : far_.SlopeAt(r_m);
-    const float cosine = std::max(0.0f, r_cells.dot(normal) * cell / r_m);
-    const float slope = cell * stretch * kappa * cosine;  // relative slope of the potential per cell
-    const float conductance = face * problem_.sigma[j * kWindow + i] * slope / (1.0f + 0.5f * slope);
-    const float share = tented ? 1.0f : far_.ShareAt(r_m);
-    problem_.ground[j * kWindow + i] += conductance;
-    border_[face_count++] = {static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(j), share * conductance,
-                             (1.0f - share) * conductance};
-  };
-  const float stretch_s = std::sqrt(metric_.ss), stretch_t = std::sqrt(metric_.tt);
-  for (int n = 0; n < kWindow; ++n) {
-    add(0, n, problem_.face_s, stretch_s, -Vec2f::UnitX());
-    add(kWindow - 1, n, problem_.face_s, stretch_s, Vec2f::UnitX());
-    add(n, 0, problem_.face_t, stretch_t, -Vec2f::UnitY());
-    add(n, kWindow - 1, problem_.face_t, stretch_t, Vec2f::UnitY());
-  }
 }
 
 FULCRUM_WIDE
@@ -360,43 +330,26 @@ void SourceWindow::Deposit(float v2_s, float remove_theta, Ledger* ledger) {
   }
 }
 
-void SourceWindow::AddLeak(float v2_s) {
-  for (int j = 0; j < kWindow; ++j) {
-    for (int i = 0; i < kWindow; ++i) {
-      const int k = j * kWindow + i;
-      const float volts = potential_.Voltage(i, j);
-      leak_V2s_[k] += tissue_[k] > 0.0f ? v2_s * volts * volts : 0.0f;
-    }
-  }
-}
-
-void SourceWindow::AddFar(float v2_s) {
-  double sheet_S = 0, leak_S = 0;
-  for (const BorderFace& face : border_) {
-    const float volts = potential_.Voltage(face.i, face.j);
-    sheet_S += static_cast<double>(face.sheet_S * volts * volts);
-    leak_S += static_cast<double>(face.leak_S * volts * volts);
-  }
-  const double energy = static_cast<double>(v2_s) * solved_.scale;
-  far_J_ += energy * sheet_S;
-  stats_.far_leak_J += energy * leak_S;
-}
-
 void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive, float duration_s, Ledger* ledger) {
   const Vec2f centre = 0.5f * (path.from + path.to);
   const CellIndex middle = sheet_.CellOf(centre);
+  // The heat beyond the window belongs to the place and the kind of contact before.
+  const float away = (centre - far_middle_).norm() / material_.cell_m;
+  if (path.tented != far_tented_ || away > kFarAway) DepositFar(field, false, ledger);
   MoveTo({middle.ix - kWindow / 2, middle.iy - kWindow / 2});
   Load(field, ledger);
   metric_ = sheet_.MetricAt(static_cast<float>(middle.ix), static_cast<float>(middle.iy));
   problem_.face_s = material_.thickness_m * metric_.tt / metric_.area();
   problem_.face_t = material_.thickness_m * metric_.ss / metric_.area();
   SetSigma();
+  const float reach_m = std::max(drive.arc_m, kFilmReach_m);
+  SetGaps(path, 0.5f, reach_m);
+  SetLeak(centre, path.tented);
   SetGround(centre, path.tented);
   const float cells = (path.to - path.from).norm() / material_.cell_m;
   const float by_travel = duration_s / std::clamp(cells / kMaxTravel, 1.0f, kMaxStepsByTravel);
   const float by_film = drive.discharges ? kFilmStep_s : by_travel;
   const float longest = std::max(std::min(by_travel, by_film), std::min(min_step_s, duration_s));
-  const float reach_m = std::max(drive.arc_m, kFilmReach_m);
   leak_V2s_.fill(0);
   float t = 0;
   for (bool last = !(duration_s > 0.0f); !last;) {

@@ -34,18 +34,19 @@ inline constexpr CellIndex kNowhere{-(1 << 24), -(1 << 24)};
 /// Radius around the tip beyond which a tented sheet lies on tissue and is at 0 V [m]; assumed.
 inline constexpr float kTentRadius_m = 0.015f;
 
-/// The leaky sheet far from the electrode; distances in metres.
+/// The leaky sheet far from the electrode: the solution of V'' + V'/r = V g(r) / (sigma d) that falls to 0, g the leak.
+/// Distances in metres.
 class FarField {
  public:
   explicit FarField(const Material& material);
-  /// -V' / V = K1 / (lambda K0) [1/m].
+  /// -V' / V [1/m].
   [[nodiscard]] float SlopeAt(float r_m) const { return At(slope_, r_m); }
   /// Joule heat by volume, in any unit.
   [[nodiscard]] float DensityAt(float r_m) const { return At(density_, r_m); }
   /// Of the power that crosses a circle, the share that the sheet beyond it dissipates; the rest is the tissue's
   /// beneath.
   [[nodiscard]] float ShareAt(float r_m) const { return At(share_, r_m); }
-  /// Distance within which the heat beyond the window is put [m].
+  /// Distance from the metal's middle within which the heat beyond the window is put [m].
   [[nodiscard]] float reach_m() const { return reach_m_; }
 
  private:
@@ -83,8 +84,9 @@ struct SourceStats {
   int removed_cells = 0;
   CellIndex low{INT32_MAX, INT32_MAX}, high{INT32_MIN, INT32_MIN};  ///< Box of the removed cells.
   float voltage_V = 0, current_A = 0;                               ///< Electrode, rms, of the last solve.
-  double far_leak_J = 0;                                            ///< Of the tissue beneath, beyond the window.
-  float imbalance = 0;                                              ///< Largest PotentialResult::imbalance.
+  /// Heat of the tissue beneath the window (after KeepLeak) and beneath the sheet beyond, where it is put nowhere [J].
+  double leak_J = 0, far_leak_J = 0;
+  float imbalance = 0;  ///< Largest PotentialResult::imbalance.
 };
 
 class SourceWindow {
@@ -94,8 +96,8 @@ class SourceWindow {
   /// Heats the sheet for `duration_s` while the tip moves along the path.
   void Run(HeatField* field, const TipPath& path, const Drive& drive, float duration_s, Ledger* ledger);
 
-  /// Heats the sheet beyond the window by what the current of the last Runs has dissipated there. `hold`: the next
-  /// Diffuse lets none of its tiles sleep, which warm by less a frame than what they sleep below.
+  /// Heats the sheet beyond the window by what the current of the last Runs has dissipated there. `hold`: its tiles
+  /// stay awake in the next Diffuse, although one frame may warm them by less than kSleepTheta.
   void DepositFar(HeatField* field, bool hold, Ledger* ledger);
 
   /// Time integral of the squared potential against the tissue beneath, over the last Run [V^2 s]; cell (i, j) of the
@@ -135,6 +137,7 @@ class SourceWindow {
   void Load(HeatField* field, Ledger* ledger);
   /// Copies the window back to the tiles. All tiles under the window are marked as the tip's place is: tented or not.
   void Store(HeatField* field, bool tented);
+  void SetLeak(const Vec2f& middle, bool tented);
   void SetGround(const Vec2f& middle, bool tented);
   /// Sets the gap of each cell from the metal at fraction `at` of the path.
   void SetGaps(const TipPath& path, float at, float reach_m);
@@ -160,6 +163,8 @@ class SourceWindow {
   [[nodiscard]] float SolveStep(const Drive& drive, float longest);
   void Heat(const Drive& drive, bool tented, float dt_s, Ledger* ledger);
   void Deposit(float v2_s, float remove_theta, Ledger* ledger);
+  /// Radius of the disc that is as large as the metal's footprint [cells].
+  [[nodiscard]] float MetalRadius() const;
   void AddLeak(float v2_s);
   void AddFar(float v2_s);
   void BoilRow(int j, float remove_theta, Ledger* ledger);
@@ -186,6 +191,7 @@ class SourceWindow {
   bool far_tented_ = false;
   SourceStats stats_;
   bool keep_leak_ = false;
+  alignas(64) std::array<float, kWindowCells> leak_{};  ///< Conductance to the tissue beneath [S].
   alignas(64) std::array<float, kWindowCells> leak_V2s_{};
 
   /// Heat of the last solve without that of the film [W/V^2].

@@ -7,7 +7,7 @@
 // k thermal conductivity [W/(m K)], w water. The arrays hold G / W, W = cell_m^2 d.
 //
 // A boiling cell is at one temperature, that of the front between its dry and its wet part. With 1 / (2 k) the front
-// would be a third of a cell ahead of Neumann's solution (16 % after 1 s in cells of 100 um, instead of 0.3).
+// would be a third of a cell ahead of Neumann's solution (16 % after 1 s in cells of 100 um, instead of 0.5).
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -21,14 +21,14 @@ namespace {
 /// Difference of water from which on the material of two cells differs: their fluxes are of second order.
 constexpr float kWaterJump = 0.25f;
 
-/// Conductance of a face over d: 0 if either cell is no tissue. Their resistances are those towards less water and
-/// towards at least as much.
+/// The entries of CellResistance for one cell.
 struct Half {
   float water, to_drier, to_wetter;
 };
 [[gnu::always_inline]] inline Half HalfAt(const CellResistance& of, int at) {
   return {of.water[at], of.to_drier[at], of.to_wetter[at]};
 }
+/// Conductance of a face over d: 0 if either cell is no tissue.
 [[gnu::always_inline]] inline float Conductance(const Half& a, const Half& b) {
   const float of_a = b.water < a.water ? a.to_drier : a.to_wetter;
   const float of_b = a.water < b.water ? b.to_drier : b.to_wetter;

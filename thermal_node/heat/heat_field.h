@@ -32,11 +32,12 @@ inline constexpr float kResolvedGain = 7.0f / 6.0f;  ///< The same ratio for a w
 inline constexpr float kShearIgnored = 1e-4f;
 /// Maximum number of substeps of a step. If more are needed, the conductances of faces are limited to what these allow.
 inline constexpr int kMaxSubsteps = 64;
-/// Share of theta_boil from which on a cell with a part of its water boils: rounding leaves it a little below.
-inline constexpr float kFrontTheta = 0.9999f;
-/// No front is nearer to a face than this share of a cell; less would cost substeps. Error of the front after 1 s in
-/// cells of 200, 100 and 50 um (bench_truth): 0.1: 2.4, 0.7, 0.06 %; 0.25: 0.9, -0.3, 0.05 %; 0.4: -2.9, -2.5, -1.1 %.
-inline constexpr float kLeastFrontDistance = 0.25f;
+/// Share of theta_boil from which on a cell with a part of its water counts as boiling: between two steps the tissue
+/// beneath and a cold hook take a kelvin or two.
+inline constexpr float kFrontTheta = 0.98f;
+/// No front is nearer to a face than this share of a cell; less would cost substeps
+/// (deploy/docs/measurements/thermal, Front of boiling).
+inline constexpr float kLeastFrontDistance = 0.15f;
 inline constexpr float kThetaPlausible = 5000.0f;  ///< Largest plausible |theta|; cells beyond it are quarantined [K].
 
 /// Fills the tile's geometry from the sheet's metric.

@@ -18,7 +18,7 @@ struct Ledger {
   double lost = 0;         ///< Lost through both faces and by perfusion.
   double dropped = 0;      ///< Discarded when a tile fell asleep.
   double quarantined = 0;  ///< Removed with quarantined cells.
-  /// Delivered by the generator: joule, film, and the heat of the tissue beneath and beyond the window.
+  /// Delivered by the generator: joule, film, and the heat of the tissue beneath.
   double generator = 0;
 
   [[nodiscard]] double Out() const { return vapour + removed + debris + lost + dropped + quarantined; }

@@ -59,6 +59,7 @@ Material MakeMaterial(const ThermalParams& p) {
   m.sigma = p.sigma_S_m;
   m.sigma_per_K = p.sigma_per_K;
   m.leak_S_m2 = p.sigma_fat_S_m / p.fat_depth_m;
+  m.fat_depth_m = p.fat_depth_m;
   return m;
 }
 

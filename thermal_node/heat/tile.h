@@ -59,9 +59,9 @@ struct TileGeometry {
   std::vector<float> shear;                                       ///< sqrt(g) g^st at Corner; empty: none.
 };
 
-/// Thermal resistance of half a cell times conductance of a cell's length, by the water of the neighbour [m K/W];
-/// infinite where there is no tissue. It differs by side only in a cell that boils: there theta is that of the front
-/// between dry and wet tissue, and the front divides the cell as its water does.
+/// Thermal resistance from where a cell has its theta to its face, over cell_m [m K/W]; infinite where there is no
+/// tissue. It differs by side only in a cell that boils: there theta is that of the front between dry and wet tissue,
+/// and the front divides the cell as its water does.
 struct CellResistance {
   alignas(64) std::array<float, kThetaCount> water{};
   alignas(64) std::array<float, kThetaCount> to_drier{};   ///< To the face of a neighbour with less water.
@@ -95,9 +95,9 @@ struct Tile {
   float water_off = 0;         ///< Largest |water - 0.5|; above 0.5 the water of a cell is not a fraction.
   float rate = 0;              ///< The largest of cell_rate.
   int substeps = 0;            ///< Substeps of the tile's island in the last step.
-  bool material_stale = true;  ///< Conductivities have changed.
+  bool material_stale = true;  ///< Resistances must be computed.
   bool faces_stale = true;     ///< Conductances of faces must be recomputed.
-  bool has_front = false;      ///< A cell boiled when the conductivities were computed.
+  bool has_front = false;      ///< A cell boiled when the resistances were computed.
   bool patch_stale = true;     ///< Changed since it was last drawn into a patch.
   bool held = false;           ///< A warm neighbour touches the tile: it must not sleep in this step.
 

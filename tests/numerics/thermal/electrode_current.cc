@@ -113,7 +113,83 @@ double WindowConductance(const Material& material, const CapsuleOnSheet& capsule
   return window.stats().current_A / window.stats().voltage_V;
 }
 
-EnergyShares SharesOfEnergy(const Material& material) {
+DiscInDepth SolveDiscInDepth(const Material& material, double radius_m, double rim_m) {
+  // Borders from 0 on, each cell wider than the last by `growth` up to `widest`, to `end`.
+  const auto graded = [](double first, double growth, double widest, double end) {
+    std::vector<double> border{0};
+    for (double width = first; border.back() < end; width = std::min(width * growth, widest)) {
+      border.push_back(std::min(border.back() + width, end));
+    }
+    return border;
+  };
+  const double thickness = material.thickness_m, depth = material.fat_depth_m;
+  constexpr double kFar_m = 0.06;
+  std::vector<double> r, z;
+  const std::vector<double> inner = graded(rim_m, 1.12, radius_m / 8, radius_m);
+  for (auto at = inner.rbegin(); at != inner.rend(); ++at) r.push_back(radius_m - *at);
+  for (const double at : graded(rim_m, 1.06, 2e-3, kFar_m)) r.push_back(radius_m + at);
+  r.erase(std::unique(r.begin(), r.end()), r.end());
+  z = graded(rim_m, 1.15, thickness / 6, thickness);
+  const auto layers = static_cast<Eigen::Index>(z.size()) - 1;  // of the sheet
+  for (const double at : graded(thickness / 10, 1.12, depth / 12, depth)) z.push_back(thickness + at);
+  z.erase(std::unique(z.begin(), z.end()), z.end());
+  const auto nr = static_cast<Eigen::Index>(r.size()) - 1, nz = static_cast<Eigen::Index>(z.size()) - 1;
+  const double fat = static_cast<double>(material.leak_S_m2) * depth;
+  const auto sigma = [&](Eigen::Index k) { return k < layers ? static_cast<double>(material.sigma) : fat; };
+  const auto width = [&](Eigen::Index k) {
+    return z[static_cast<std::size_t>(k) + 1] - z[static_cast<std::size_t>(k)];
+  };
+  const auto middle = [&](Eigen::Index i) {
+    return 0.5 * (r[static_cast<std::size_t>(i)] + r[static_cast<std::size_t>(i) + 1]);
+  };
+  const auto area = [&](Eigen::Index i) {
+    const double a = r[static_cast<std::size_t>(i)], b = r[static_cast<std::size_t>(i) + 1];
+    return std::numbers::pi * (b * b - a * a);
+  };
+  const auto half = [&](Eigen::Index i, Eigen::Index k) {
+    return 2 * area(i) * sigma(k) / width(k);
+  };  // of a cell, along z
+  const auto covered = [&](Eigen::Index i) { return r[static_cast<std::size_t>(i) + 1] <= radius_m * (1 + 1e-9); };
+  std::vector<Eigen::Triplet<double>> entries;
+  Eigen::VectorXd diagonal = Eigen::VectorXd::Zero(nr * nz), current = diagonal;
+  const auto join = [&](Eigen::Index p, Eigen::Index q, double conductance) {
+    entries.emplace_back(p, q, -conductance);
+    entries.emplace_back(q, p, -conductance);
+    diagonal[p] += conductance;
+    diagonal[q] += conductance;
+  };
+  for (Eigen::Index k = 0; k < nz; ++k) {
+    for (Eigen::Index i = 0; i < nr; ++i) {
+      const Eigen::Index p = k * nr + i;
+      if (i + 1 < nr) join(p, p + 1, 2 * std::numbers::pi * sigma(k) * width(k) / std::log(middle(i + 1) / middle(i)));
+      if (k + 1 < nz) {
+        join(p, p + nr, 1 / (1 / half(i, k) + 1 / half(i, k + 1)));
+      } else {
+        diagonal[p] += half(i, k);  // the conductor
+      }
+      if (k == 0 && covered(i)) {
+        diagonal[p] += half(i, k);
+        current[p] = half(i, k);
+      }
+    }
+  }
+  for (Eigen::Index p = 0; p < nr * nz; ++p) entries.emplace_back(p, p, diagonal[p]);
+  Eigen::SparseMatrix<double> matrix(nr * nz, nr * nz);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  const Eigen::VectorXd v = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(matrix).solve(current);
+  DiscInDepth result;
+  double into_fat = 0;
+  for (Eigen::Index i = 0; i < nr; ++i) {
+    result.conductance_S += current[i] * (1 - v[i]);
+    const Eigen::Index above = (layers - 1) * nr + i;
+    const double a = half(i, layers - 1), b = half(i, layers), through = (v[above] - v[above + nr]) / (1 / a + 1 / b);
+    into_fat += through * (v[above] - through / a);
+  }
+  result.sheet_share = 1 - into_fat / result.conductance_S;
+  return result;
+}
+
+EnergyShares SharesOfEnergy(const Material& material, bool tented) {
   const float side = 20e-3f;
   HeatField field(MakeFlatSheet(side, side, material.cell_m), material);
   SourceWindow window(field.material(), field.sheet());
@@ -121,15 +197,13 @@ EnergyShares SharesOfEnergy(const Material& material) {
   TipPath path;
   path.from = path.to = {0.5f * side, 0.5f * side};
   path.radius_m = 5e-4f;
+  path.tented = tented;
   Ledger ledger;
   window.Run(&field, path, {.power_W = 30, .v_max_V = 350, .i_max_A = 2, .remove_theta = 1e3f, .arc_m = 4e-4f}, 1e-3f,
              &ledger);
   const double within = ledger.joule;
   window.DepositFar(&field, false, &ledger);
-  double leak_V2s = 0;
-  for (const float of_cell : window.leak_V2s()) leak_V2s += static_cast<double>(of_cell);
-  const double per_cell = static_cast<double>(material.leak_S_m2 * material.cell_m * material.cell_m);
-  const double beneath = leak_V2s * per_cell + window.stats().far_leak_J;
+  const double beneath = window.stats().leak_J + window.stats().far_leak_J;
   const double all = ledger.generator;
   return {ledger.joule / all, (ledger.joule - within) / all, beneath / all,
           (all - ledger.joule - ledger.film - beneath) / all};

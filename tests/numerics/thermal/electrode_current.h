@@ -26,6 +26,14 @@ struct CapsuleOnSheet {
 [[nodiscard]] double WindowConductance(const Material& material, const CapsuleOnSheet& capsule, float heading,
                                        const Vec2f& from_node);
 
+/// A disc on the sheet over fat of depth H over a conductor, in three dimensions: finite volumes in r and z, in double,
+/// cells of `rim_m` at the disc's rim and ever wider ones away from it. 4 um are within 0.3 % of 8 um.
+struct DiscInDepth {
+  double conductance_S = 0;
+  double sheet_share = 0;  ///< Of the power.
+};
+[[nodiscard]] DiscInDepth SolveDiscInDepth(const Material& material, double radius_m, double rim_m);
+
 /// Where the generator's energy goes, as shares of it: a disc on wet tissue.
 struct EnergyShares {
   double sheet = 0;        ///< In and beyond the window.
@@ -33,6 +41,6 @@ struct EnergyShares {
   double beneath = 0;      ///< The tissue beneath.
   double unaccounted = 0;  ///< Neither these nor the film.
 };
-[[nodiscard]] EnergyShares SharesOfEnergy(const Material& material);
+[[nodiscard]] EnergyShares SharesOfEnergy(const Material& material, bool tented = false);
 
 }  // namespace fulcrum::thermal

@@ -213,8 +213,8 @@ double SphereError(float cell_m, float dt_s) {
   return problem.Error(0.24);
 }
 
-double StefanError(float cell_m) {
-  constexpr double kWall_K = 350, kTime_s = 1;
+double StefanError(float cell_m, double time_s) {
+  constexpr double kWall_K = 350;
   ThermalParams params;
   params.cell_m = cell_m;
   params.h_top_W_m2K = params.h_below_W_m2K = params.h_tented_W_m2K = params.perfusion_per_s = 0;
@@ -241,10 +241,10 @@ double StefanError(float cell_m) {
     for (int j = 0; j < kTile; ++j) tile->state.water[j * kTile] = 0;
   }
   field.Diffuse(1e-6f, &ledger);
-  const auto steps = static_cast<int>(std::lround(kTime_s / (0.05 * static_cast<double>(cell_m * cell_m) / 1e-6)));
+  const auto steps = static_cast<int>(std::lround(time_s / (0.05 * static_cast<double>(cell_m * cell_m) / 1e-6)));
   for (int n = 0; n < steps; ++n) {
     hold_wall();
-    field.Diffuse(static_cast<float>(kTime_s / steps), &ledger);
+    field.Diffuse(static_cast<float>(time_s / steps), &ledger);
   }
   double front = -1;
   for (int tx = 0; tx < field.sheet().tiles_x; ++tx) {
@@ -266,7 +266,7 @@ double StefanError(float cell_m) {
     const double middle = 0.5 * (low + high);
     (excess(middle) > 0 ? low : high) = middle;
   }
-  return front / (2 * low * std::sqrt(dry * kTime_s)) - 1;
+  return front / (2 * low * std::sqrt(dry * time_s)) - 1;
 }
 
 double TimeOrder() {

@@ -48,11 +48,11 @@ void ForCells(const HeatField& field, const F& visit) {
 /// shear by 27 degrees.
 [[nodiscard]] double SphereError(float cell_m, float dt_s);
 
-/// A front of boiling that a wall at 350 K above body temperature drives into wet tissue: its depth after 1 s against
-/// Neumann's solution of the two-phase Stefan problem (Carslaw and Jaeger, Conduction of Heat in Solids, 11.2),
+/// A front of boiling that a wall at 350 K above body temperature drives into wet tissue: its depth after `time_s`
+/// against Neumann's solution of the two-phase Stefan problem (Carslaw and Jaeger, Conduction of Heat in Solids, 11.2),
 /// relative. Depth is the share of water gone times the length. Steps are as short as the cells ask for, so that the
 /// wall is held.
-[[nodiscard]] double StefanError(float cell_m);
+[[nodiscard]] double StefanError(float cell_m, double time_s = 1);
 
 /// Order of the step in time on the same problem, from the differences of steps of 48, 24 and 12 ms on one grid.
 [[nodiscard]] double TimeOrder();
