@@ -12,8 +12,8 @@ namespace {
 constexpr float kFarthest_m = 10.0f;
 
 /// A substep longer than this [s] after a correction above this [m], as when taut tissue is let go, takes more
-/// iterations: the tissue is back at rest nearly as soon as with an exact solve. With two more the error of a cut grows;
-/// shorter substeps converge without (deploy/docs/measurements/physics, Release).
+/// iterations: the tissue is back at rest nearly as soon as with an exact solve. With two more the error of a cut
+/// grows; shorter substeps converge without (deploy/docs/measurements/physics, Release).
 constexpr float kLargeCorrection_m = 0.001f, kLongSubstep_s = 0.004f;
 constexpr int kMoreIterations = 4;
 
