@@ -80,14 +80,16 @@ void MeasureSource(benchmark::Report* report) {
     }
     report->Add("truth.potential.conductance_error_pct", 100 * largest, "%");
   }
-  if (report->Wants("truth.mesentery.")) {
+  if (!report->Wants("truth.mesentery.")) return;
+  for (const bool tented : {false, true}) {
+    const std::string stem = tented ? "truth.mesentery.tented." : "truth.mesentery.on_fat.";
     std::vector<double> rises;
     for (const float cell_m : {4e-5f, 7e-5f, 1e-4f, 2e-4f}) {
-      rises.push_back(RiseAtOneMillimetre({.tented = false, .cell_m = cell_m}));
+      rises.push_back(RiseAtOneMillimetre({.tented = tented, .cell_m = cell_m}));
     }
     const auto [least, most] = std::minmax_element(rises.begin(), rises.end());
-    report->Add("truth.mesentery.rise_K", rises[2], "K");
-    report->Add("truth.mesentery.spread_K", *most - *least, "K");
+    report->Add(stem + "rise_K", rises[2], "K");
+    report->Add(stem + "spread_K", *most - *least, "K");
   }
 }
 
