@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <optional>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "tests/support/browser_client.h"
 #include "tests/support/cart.h"
@@ -20,10 +22,11 @@ constexpr double kPatience_s = 60;
 
 class Window final : public OperatedSession {
  public:
-  Window(const std::string& scene, int domain) : OperatedSession(domain) {
+  Window(const std::string& scene, int domain, std::vector<std::string> options) : OperatedSession(domain) {
     if (screen_.display().empty()) return;
     ::setenv("DISPLAY", screen_.display().c_str(), 1);
-    cart_.emplace(scene, domain, std::vector<std::string>{"--hands", "mouse"});
+    options.insert(options.end(), {"--hands", "mouse"});
+    cart_.emplace(scene, domain, options);
     client_.emplace(screen_.display());
   }
   [[nodiscard]] std::string missing() const override {
@@ -82,8 +85,8 @@ std::string OperatedSession::Begin() {
   return {};
 }
 
-std::unique_ptr<OperatedSession> WindowSession(const std::string& scene, int domain) {
-  return std::make_unique<Window>(scene, domain);
+std::unique_ptr<OperatedSession> WindowSession(const std::string& scene, int domain, std::vector<std::string> options) {
+  return std::make_unique<Window>(scene, domain, std::move(options));
 }
 
 std::unique_ptr<OperatedSession> BrowserSession(const std::string& scene, int domain, const fs::path& npm) {

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "services/scene/format/scene_file.h"
 #include "tests/support/mouse_operator.h"
@@ -37,8 +38,9 @@ class OperatedSession {
   std::unique_ptr<Eyes> eyes_;
 };
 
-/// `fulcrum up SCENE --hands mouse` on an X server of its own.
-[[nodiscard]] std::unique_ptr<OperatedSession> WindowSession(const std::string& scene, int domain);
+/// `fulcrum up SCENE --hands mouse OPTIONS` on an X server of its own.
+[[nodiscard]] std::unique_ptr<OperatedSession> WindowSession(const std::string& scene, int domain,
+                                                             std::vector<std::string> options = {});
 /// A session of the console's page in headless Chromium. @param npm folder of the driver, made where it is missing.
 [[nodiscard]] std::unique_ptr<OperatedSession> BrowserSession(const std::string& scene, int domain,
                                                               const std::filesystem::path& npm);

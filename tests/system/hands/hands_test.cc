@@ -149,7 +149,9 @@ void DissectIn(testing::OperatedSession* session) {
 }
 
 TEST(Hands, TheWindowsMouseGraspsTentsCuts20MmAndReleasesInBuiltIn) {
-  DissectIn(testing::WindowSession("built-in", kDomain).get());
+  // The test is about hands. At the scene's 30 Hz a software rasteriser beside four nodes on two slow cores draws fewer
+  // than the 20 % of the pictures that a session needs in order to be well.
+  DissectIn(testing::WindowSession("built-in", kDomain, {"--set", "render.rate_Hz=10"}).get());
 }
 
 TEST(Hands, ThePagesMouseGraspsTentsCuts20MmAndReleasesInBuiltIn) {
