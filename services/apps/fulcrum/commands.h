@@ -26,6 +26,7 @@ ExitCode Dump(const Words& words);
 ExitCode Generator(const Words& words);
 ExitCode Log(const Words& words);
 ExitCode TestNode(const Words& words);
+ExitCode Validate(const Words& words);
 ExitCode Keys(const Words& words);
 ExitCode Doctor(const Words& words);
 ExitCode Inputs(const Words& words);

@@ -3,6 +3,7 @@
 // (tests/numerics/thermal/heat_cases.h) is the product's own solver.
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "tests/numerics/thermal/electrode_current.h"
 #include "tests/numerics/thermal/heat_cases.h"
 #include "tests/numerics/thermal/mesentery.h"
+#include "tests/validation/solid_cases.h"
 
 namespace fulcrum {
 namespace {
@@ -47,6 +49,20 @@ void MeasureSheet(const std::string& stem, MembraneModel model, benchmark::Repor
     report->Add(stem + "hencky_error_pct", 100 * std::abs(error), "%");
     report->Add(stem + "hencky_order", Order(error, HenckyDisc(model, 2 * kCells)), "1");
   }
+}
+
+/// Solids against CalculiX: the organ's tube with its one layer and with two, a block of as large elements.
+void MeasureSolids(benchmark::Report* report) {
+  if (!report->Wants("truth.tube.") && !report->Wants("truth.block.")) return;
+  const validation::Expectations expected =
+      validation::ReadExpectations(std::filesystem::path(FULCRUM_SOURCE_DIR) / "deploy/validation");
+  const auto error_pct = [&](const validation::Quantities& results) {
+    const auto& [quantity, value] = results.front();
+    return 100 * std::abs(value / expected.at(quantity).value - 1);
+  };
+  report->Add("truth.tube.pinch_error_pct", error_pct(validation::Pinch(1)), "%");
+  report->Add("truth.tube.pinch_error_pct.two_layers", error_pct(validation::Pinch(2)), "%");
+  report->Add("truth.block.indent_error_pct", error_pct(validation::Dent(8)), "%");
 }
 
 /// A front of boiling in cells of the default 100 um. Order: of the mean square at times at which the front is in
@@ -100,6 +116,7 @@ int main(int argc, char** argv) {
   fulcrum::benchmark::Report report(argc, argv);
   fulcrum::MeasureSheet("truth.sheet.", fulcrum::MembraneModel::kContinuum, &report);
   fulcrum::MeasureSheet("truth.springs.", fulcrum::MembraneModel::kSprings, &report);
+  fulcrum::MeasureSolids(&report);
   fulcrum::MeasureStefan(&report);
   fulcrum::MeasureSource(&report);
 }

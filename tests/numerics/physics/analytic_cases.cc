@@ -9,6 +9,7 @@
 
 #include "services/scene/format/scene_file.h"
 #include "tests/numerics/physics/reference/static_solver.h"
+#include "tests/numerics/physics/solid_mesh.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -16,137 +17,17 @@ namespace {
 using reference::ElasticEnergy;
 using reference::Points;
 
-constexpr double kYoungs_Pa = 1e5;
+constexpr double kYoungs_Pa = kSolidYoungs_Pa;
 /// Residual forces are far below the loads, which are chosen for displacements of about 1e-4 of the size.
 constexpr double kTolerance_N = 1e-12;
-
-/// A block of bricks with nodes (i, j, k), each cut into six tetrahedra along the diagonal 000-111 (Kuhn), as the
-/// procedural organ is.
-struct Mesh {
-  ElasticModel model;
-  std::array<int, 3> bricks{};
-  bool closed = false;  ///< The second direction is periodic: its last node is its first.
-
-  [[nodiscard]] Index Node(int i, int j, int k) const {
-    const int across = bricks[1] + (closed ? 0 : 1);
-    return static_cast<Index>((i * across + (closed ? j % bricks[1] : j)) * (bricks[2] + 1) + k);
-  }
-  [[nodiscard]] Points Rest() const { return reference::RestPoints(model); }
-};
-
-Mesh MakeMesh(std::array<int, 3> bricks, bool closed, double poisson,
-              const std::function<Vec3d(int, int, int)>& place) {
-  Mesh mesh;
-  mesh.bricks = bricks;
-  mesh.closed = closed;
-  ElasticModel& model = mesh.model;
-  for (int i = 0; i <= bricks[0]; ++i) {
-    for (int j = 0; j < bricks[1] + (closed ? 0 : 1); ++j) {
-      for (int k = 0; k <= bricks[2]; ++k) {
-        model.rest_position.push_back(place(i, j, k));
-      }
-    }
-  }
-  model.mass.assign(model.rest_position.size(), 1.0);
-  model.mu_Pa = kYoungs_Pa / (2 * (1 + poisson));
-  model.lambda_Pa = kYoungs_Pa * poisson / ((1 + poisson) * (1 - 2 * poisson));
-  constexpr int kPaths[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
-  for (int i = 0; i < bricks[0]; ++i) {
-    for (int j = 0; j < bricks[1]; ++j) {
-      for (int k = 0; k < bricks[2]; ++k) {
-        for (const auto& path : kPaths) {
-          std::array<int, 3> at{i, j, k};
-          ElasticTet tet;
-          tet.v[0] = mesh.Node(i, j, k);
-          for (std::size_t step = 0; step < 3; ++step) {
-            ++at[static_cast<std::size_t>(path[step])];
-            tet.v[step + 1] = mesh.Node(at[0], at[1], at[2]);
-          }
-          Mat3d edges;
-          const auto fill = [&] {
-            for (int c = 0; c < 3; ++c) {
-              edges.col(c) =
-                  model.rest_position[tet.v[static_cast<std::size_t>(c) + 1]] - model.rest_position[tet.v[0]];
-            }
-          };
-          fill();
-          if (edges.determinant() < 0) {
-            std::swap(tet.v[2], tet.v[3]);
-            fill();
-          }
-          tet.volume = edges.determinant() / 6;
-          tet.inverse_edges = edges.inverse();
-          model.tets.push_back(tet);
-        }
-      }
-    }
-  }
-  AddOrganPatches(&model);
-  return mesh;
-}
-
-/// A bar along x from the origin, of square cross-section; y and z start at 0 (a plane of symmetry where needed).
-Mesh MakeBar(int n, double length, double thickness, double poisson) {
-  const double h = thickness / n;
-  return MakeMesh({static_cast<int>(std::lround(length / h)), n, n}, false, poisson,
-                  [h](int i, int j, int k) { return Vec3d(i * h, j * h, k * h); });
-}
-
-/// Adds the forces of a traction on those faces of tets whose corners are all in the set: exact for tractions that are
-/// linear over each face.
-void AddTraction(const Mesh& mesh, const std::function<bool(const Vec3d&)>& on_face,
-                 const std::function<Vec3d(const Vec3d& place, const Vec3d& outward)>& traction, Points* load) {
-  constexpr int kFaces[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
-  for (const ElasticTet& tet : mesh.model.tets) {
-    for (const auto& face : kFaces) {
-      std::array<Index, 3> v;
-      std::array<Vec3d, 3> x;
-      bool inside = true;
-      for (std::size_t c = 0; c < 3; ++c) {
-        v[c] = tet.v[static_cast<std::size_t>(face[c])];
-        x[c] = mesh.model.rest_position[v[c]];
-        inside = inside && on_face(x[c]);
-      }
-      if (!inside) {
-        continue;
-      }
-      const Vec3d area = 0.5 * (x[1] - x[0]).cross(x[2] - x[0]);
-      const Vec3d outward = area.normalized();
-      for (std::size_t c = 0; c < 3; ++c) {
-        // Integral of a linear traction against the shape function of corner c.
-        for (std::size_t d = 0; d < 3; ++d) {
-          load->col(v[c]) += area.norm() / (c == d ? 6 : 12) * traction(x[d], outward);
-        }
-      }
-    }
-  }
-}
-
-/// Coordinates that are held: those for which `where(place, axis)` is true.
-std::vector<bool> HeldWhere(const Mesh& mesh, const std::function<bool(const Vec3d&, int)>& where) {
-  std::vector<bool> held;
-  for (const Vec3d& place : mesh.model.rest_position) {
-    for (int axis = 0; axis < 3; ++axis) {
-      held.push_back(where(place, axis));
-    }
-  }
-  return held;
-}
-
-Points Displacement(const Mesh& mesh, const std::vector<bool>& held, const Points& load) {
-  const Points rest = mesh.Rest();
-  return SolveStatic(ElasticEnergy(mesh.model), rest, held, load, kTolerance_N).x - rest;
-}
-
-Points NoLoad(const Mesh& mesh) { return Points::Zero(3, static_cast<Eigen::Index>(mesh.model.mass.size())); }
 
 }  // namespace
 
 BarErrors HangingBar(int n, double poisson) {
   // A quarter of the bar, x from the lower end up; y = 0 and z = 0 are planes of symmetry.
   constexpr double kLength = 0.04, kHalf = 0.01, kWeight = 1e-3 * kYoungs_Pa / kLength;
-  const Mesh mesh = MakeBar(n, kLength, kHalf, poisson);
-  Points load = NoLoad(mesh);
+  const SolidMesh mesh = MakeBar(n, kLength, kHalf, poisson);
+  Points load = mesh.NoLoad();
   for (const ElasticTet& tet : mesh.model.tets) {
     for (const Index v : tet.v) {
       load(0, v) -= kWeight * tet.volume / 4;
@@ -160,7 +41,7 @@ BarErrors HangingBar(int n, double poisson) {
       mesh,
       HeldWhere(mesh,
                 [&](const Vec3d& p, int axis) { return axis > 0 ? p[axis] == 0 : p == mesh.model.rest_position[top]; }),
-      load);
+      load, kTolerance_N);
   Eigen::Array3d error = Eigen::Array3d::Zero(), size = Eigen::Array3d::Zero();
   for (Eigen::Index p = 0; p < u.cols(); ++p) {
     const Vec3d& x = mesh.model.rest_position[static_cast<std::size_t>(p)];
@@ -235,11 +116,11 @@ double LameTube(int n, double poisson) {
   constexpr int kAlong = 2;
   const int segments = 24 * n;
   const double slice = 2 * std::numbers::pi * kInner / segments;
-  const Mesh mesh = MakeMesh({kAlong, segments, n}, true, poisson, [&](int i, int j, int k) {
+  const SolidMesh mesh = MakeSolid({kAlong, segments, n}, true, poisson, [&](int i, int j, int k) {
     const double r = kInner + (kOuter - kInner) * k / n, angle = 2 * std::numbers::pi * j / segments;
     return Vec3d(i * slice, r * std::cos(angle), r * std::sin(angle));
   });
-  Points load = NoLoad(mesh);
+  Points load = mesh.NoLoad();
   AddTraction(
       mesh, [](const Vec3d& p) { return std::hypot(p.y(), p.z()) < kInner * (1 + 1e-9); },
       [](const Vec3d&, const Vec3d& outward) { return Vec3d(-kPressure * outward); }, &load);
@@ -253,7 +134,7 @@ double LameTube(int n, double poisson) {
                   const bool end = p.x() < 0.5 * slice || p.x() > (kAlong - 0.5) * slice;
                   return axis == 0 ? end : axis == 1 ? p == rest[top] : p == rest[right] || p == rest[left];
                 }),
-      load);
+      load, kTolerance_N);
   double widening = 0;
   for (int i = 0; i <= kAlong; ++i) {
     for (int j = 0; j < segments; ++j) {
@@ -271,7 +152,7 @@ constexpr double kBeamLength = 0.08, kBeamThickness = 0.01;
 constexpr double kBeamInertia = kBeamThickness * kBeamThickness * kBeamThickness * kBeamThickness / 12;
 bool AtEnd(const Vec3d& p) { return p.x() > kBeamLength * (1 - 1e-9); }
 
-double MeanEndDeflection(const Mesh& mesh, const Points& u) {
+double MeanEndDeflection(const SolidMesh& mesh, const Points& u) {
   double sum = 0;
   int count = 0;
   for (Eigen::Index p = 0; p < u.cols(); ++p) {
@@ -286,12 +167,13 @@ double MeanEndDeflection(const Mesh& mesh, const Points& u) {
 
 double Cantilever(int n, double poisson) {
   constexpr double kForce = 2e-5;
-  const Mesh mesh = MakeBar(n, kBeamLength, kBeamThickness, poisson);
-  Points load = NoLoad(mesh);
+  const SolidMesh mesh = MakeBar(n, kBeamLength, kBeamThickness, poisson);
+  Points load = mesh.NoLoad();
   constexpr double kArea = kBeamThickness * kBeamThickness;
   AddTraction(
       mesh, AtEnd, [](const Vec3d&, const Vec3d&) { return Vec3d(kForce / kArea * Vec3d::UnitZ()); }, &load);
-  const Points u = Displacement(mesh, HeldWhere(mesh, [](const Vec3d& p, int) { return p.x() == 0; }), load);
+  const Points u =
+      Displacement(mesh, HeldWhere(mesh, [](const Vec3d& p, int) { return p.x() == 0; }), load, kTolerance_N);
   const double shear = kYoungs_Pa / (2 * (1 + poisson)), shape = 10 * (1 + poisson) / (12 + 11 * poisson);
   const double exact = kForce * std::pow(kBeamLength, 3) / (3 * kYoungs_Pa * kBeamInertia) +
                        kForce * kBeamLength / (shape * shear * kArea);
@@ -300,8 +182,8 @@ double Cantilever(int n, double poisson) {
 
 double PureBending(int n, double poisson) {
   constexpr double kMoment = 1e-6;
-  const Mesh mesh = MakeBar(n, kBeamLength, kBeamThickness, poisson);
-  Points load = NoLoad(mesh);
+  const SolidMesh mesh = MakeBar(n, kBeamLength, kBeamThickness, poisson);
+  Points load = mesh.NoLoad();
   constexpr double kMiddle = kBeamThickness / 2;
   AddTraction(
       mesh, AtEnd,
@@ -316,7 +198,7 @@ double PureBending(int n, double poisson) {
                                             const bool below = root && p.z() == 0 && std::abs(p.y() - kMiddle) < 1e-9;
                                             return axis == 0 ? root : axis == 1 ? centre || below : centre;
                                           }),
-                                load);
+                                load, kTolerance_N);
   // u_z = M / 2EI (x^2 + nu ((z - m)^2 - (y - m)^2)), so the middle of the end determines the error.
   const double exact = kMoment * kBeamLength * kBeamLength / (2 * kYoungs_Pa * kBeamInertia);
   return u(2, mesh.Node(mesh.bricks[0], n / 2, n / 2)) / exact - 1;
