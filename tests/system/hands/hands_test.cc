@@ -149,8 +149,8 @@ void DissectIn(testing::OperatedSession* session) {
 }
 
 TEST(Hands, TheWindowsMouseGraspsTentsCuts20MmAndReleasesInBuiltIn) {
-  // The test is about hands. At 30 Hz a software rasteriser beside four nodes on two slow cores draws fewer than the 20
-  // % of the pictures that a session needs in order to be well; and a window with hands draws at the cart's rate.
+  // The test is about hands. At 30 Hz a software rasteriser beside four nodes on two slow cores draws fewer pictures
+  // than a session needs in order to be well (a fifth). A window with hands draws at the cart's rate.
   const fs::path cart = fs::path(::testing::TempDir()) / ("ten_pictures." + std::to_string(::getpid()) + ".yaml");
   std::ofstream(cart) << "nodes: {render_node: {rate_Hz: 10}}\n";
   DissectIn(testing::WindowSession("built-in", kDomain, {"--cart", cart}).get());
