@@ -72,6 +72,7 @@ Quantities LameOf(Mesh mesh) {
   return {{"tube.widening", 100 * physics::LameTube(Elements(mesh, 1), kOrganPoisson)}};
 }
 Quantities PinchOf(Mesh mesh) { return mesh == Mesh::kHalf ? Quantities{} : Pinch(Elements(mesh, 1)); }
+Quantities OvallingOf(Mesh mesh) { return mesh == Mesh::kHalf ? Quantities{} : VibrateTube(Elements(mesh, 1)); }
 
 Quantities Conduct(Mesh mesh) {
   // The step is as long as the error in space allows: it falls with the square of the cell.
@@ -116,11 +117,13 @@ const std::vector<Case>& Cases() {
       {"beam", "A clamped bar with a load at its end, and bent by a moment.", Beam},
       {"tube-pressure", "The organ's tube under inner pressure.", LameOf},
       {"tube-pinch", "The organ's tube, pinched by 30 % of its diameter.", PinchOf},
-      {"block-dent", "A block pressed over a disc: large strains.", [](Mesh mesh) { return Dent(Elements(mesh, 8)); }},
+      {"block-dent", "A block pressed over a disc, dented by 5 % of its height.",
+       [](Mesh mesh) { return Dent(Elements(mesh, 8)); }},
       {"beam-large", "A clamped bar bent by half of its length: large rotations.",
        [](Mesh mesh) { return Bend(Elements(mesh, 4)); }},
-      {"vibration", "Natural frequencies of a clamped bar and of a tube.",
-       [](Mesh mesh) { return Vibrate(Elements(mesh, 4)); }},
+      {"beam-vibration", "Natural frequencies of a clamped bar.",
+       [](Mesh mesh) { return VibrateBar(Elements(mesh, 4)); }},
+      {"tube-vibration", "Natural frequency of the organ's tube that ovals.", OvallingOf},
       {"conduction", "Heat spreads in a square and over a sphere.", Conduct},
       {"boiling-front", "A hot wall drives a front of boiling into wet tissue for 1 s.", Stefan},
       {"moving-source", "A Gaussian source of heat that moves at 10 mm/s.", MovingSource},

@@ -35,10 +35,10 @@ void WriteText(const std::string& text, const std::filesystem::path& file) {
 
 /// Errors on the three meshes as shares of the tolerance, logarithmic; the line in the middle is the tolerance.
 std::string Plot(const Row& row) {
-  constexpr double kWidth = 120, kHeight = 36, kDecades = 3;
+  constexpr double kWidth = 120, kHeight = 36, kDecades = 3;  // from the lower edge to the upper one
   const auto height = [&](double error_pct) {
     const double share = std::max(std::abs(error_pct) / row.expected.tolerance_pct, 1e-9);
-    return std::clamp(kHeight / 2 - kHeight * std::log10(share) / (2 * kDecades) * 2, 2.0, kHeight - 2);
+    return std::clamp(kHeight / 2 - kHeight * std::log10(share) / kDecades, 2.0, kHeight - 2);
   };
   std::string points, dots;
   const double errors[] = {row.half_error_pct, row.error_pct, row.twice_error_pct};
@@ -84,7 +84,6 @@ void WriteHtml(const std::vector<Row>& rows, const std::filesystem::path& file) 
           " quantities are within their tolerance. Errors are in per cent of the expected value, on the default mesh, "
           "and on meshes half and twice as fine. The plot shows these errors from coarse to fine, on a logarithmic "
           "scale about the tolerance (dashed); below the line is within it.</p>";
-  std::string title;
   for (const Case& one : Cases()) {
     bool begun = false;
     for (const Row& row : rows) {

@@ -20,7 +20,8 @@ namespace fulcrum::validation {
 [[nodiscard]] Quantities Bend(int n);
 
 /// Natural frequencies of the bar (bending, first and second) and of the tube (ovalling), with a density of 1000 kg/m^3
-/// in lumped masses. @param n for the bar; the tube has n / 2 layers.
-[[nodiscard]] Quantities Vibrate(int n);
+/// in lumped masses. @param n as for Bend and for Pinch.
+[[nodiscard]] Quantities VibrateBar(int n);
+[[nodiscard]] Quantities VibrateTube(int n);
 
 }  // namespace fulcrum::validation

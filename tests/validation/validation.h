@@ -33,8 +33,8 @@ struct Case {
 struct Expectation {
   double value = 0;
   std::string unit;
-  double tolerance_pct = 0;  ///< Of the value; where that is 0, of the quantity itself, which is a percentage.
-  std::string kind;          ///< analytic, independent (another solver), published (an experiment).
+  double tolerance_pct = 0;  ///< Share of the value; if the value is 0, the quantity is an error in per cent itself.
+  std::string kind;  ///< analytic, reference (our own, another method), independent (another solver), published.
   std::string source;
 };
 using Expectations = std::map<std::string, Expectation>;
