@@ -62,6 +62,22 @@ float HeatCells(const Part& part, float scale, Tile* tile) {
   return total;
 }
 
+/// A row of cells of the window: its first cell's place from the middle of the metal, and lengths, in cells.
+struct LeakRow {
+  float x0, y;
+  float even;         ///< Conductance of a cell to the tissue beneath, of a long wave [S].
+  float least, wave;  ///< The metal's radius, and what over the radius gives the ratio to `even`.
+};
+
+FULCRUM_WIDE
+void LeakOfRow(const LeakRow& row, const float* __restrict tissue, float* __restrict leak) {
+  for (int i = 0; i < kWindow; ++i) {
+    const float x = row.x0 + static_cast<float>(i), r = std::sqrt(x * x + row.y * row.y);
+    leak[i] = row.even * LeakRatio(row.wave / (r > row.least ? r : row.least));
+  }
+  for (int i = 0; i < kWindow; ++i) leak[i] = tissue[i] > 0.0f ? leak[i] : 0.0f;
+}
+
 }  // namespace
 
 /// The slope y = -V'/V follows y' = y^2 - y/r - g/(sigma d) from the asymptote y = (1 + l/2r)/l of constant g, inward,
@@ -129,21 +145,14 @@ float SourceWindow::MetalRadius() const {
   return std::max(std::sqrt(covered / std::numbers::pi_v<float>), 1.0f);
 }
 
-FULCRUM_WIDE
 void SourceWindow::SetLeak(const Vec2f& middle, bool tented) {
   const float cell = material_.cell_m, even = tented ? 0.0f : material_.leak_S_m2 * cell * cell * metric_.area();
   const float least = MetalRadius(), wave = material_.spreading * material_.fat_depth_m / cell;
   const float x0 = static_cast<float>(corner_.ix + sheet_.origin_x) + 0.5f - middle.x() / cell;
   const float y0 = static_cast<float>(corner_.iy + sheet_.origin_y) + 0.5f - middle.y() / cell;
   for (int j = 0; j < kWindow; ++j) {
-    const float y = y0 + static_cast<float>(j);
-    const float* __restrict tissue = &tissue_[j * kWindow];
-    float* __restrict leak = &leak_[j * kWindow];
-    for (int i = 0; i < kWindow; ++i) {
-      const float x = x0 + static_cast<float>(i), r = std::sqrt(x * x + y * y);
-      leak[i] = even * LeakRatio(wave / (r > least ? r : least));
-    }
-    for (int i = 0; i < kWindow; ++i) leak[i] = tissue[i] > 0.0f ? leak[i] : 0.0f;
+    const LeakRow row{.x0 = x0, .y = y0 + static_cast<float>(j), .even = even, .least = least, .wave = wave};
+    LeakOfRow(row, &tissue_[j * kWindow], &leak_[j * kWindow]);
   }
 }
 

@@ -2,6 +2,7 @@
 // code without contraction gives the same bits in all of them.
 #pragma once
 
+// For functions of one translation unit alone: clang 14 names the clones' resolver otherwise than other units call it.
 // Resolvers of cloned functions cannot run while a sanitizer starts. Other processors have the baseline only.
 #if !defined(__x86_64__) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define FULCRUM_WIDE
