@@ -2,9 +2,9 @@
 // code without contraction gives the same bits in all of them.
 #pragma once
 
-// For functions of one translation unit alone: clang 14 names the clones' resolver otherwise than other units call it.
+// Only for GCC: clones of clang 14 run AVX-512 on processors that do not have it, and cannot be called from other units.
 // Resolvers of cloned functions cannot run while a sanitizer starts. Other processors have the baseline only.
-#if !defined(__x86_64__) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if !defined(__x86_64__) || defined(__clang__) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define FULCRUM_WIDE
 #else
 #define FULCRUM_WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
