@@ -35,10 +35,16 @@ struct Part {
   const char* name;
   double from_s, to_s;
 };
-constexpr double kGrasp_s = 6.2;
-constexpr Part kPress{"press", 0.8, 2.2}, kPalpate{"palpate", 2.2, 5.2}, kPull{"grasp", kGrasp_s + 0.9, 12.0};
+constexpr double kTap_s = 6.0, kAlong_s = 9.5, kAcross_s = 13.0, kGrasp_s = 18.0, kEnd_s = kGrasp_s + 6.0;
+constexpr std::array kParts{Part{"press", 0.8, 2.2},
+                            Part{"palpate", 2.2, 5.2},
+                            Part{"tap", kTap_s, kAlong_s - 0.5},
+                            Part{"slide_along", kAlong_s, kAcross_s - 0.5},
+                            Part{"slide_across", kAcross_s, kAcross_s + 3.0},
+                            Part{"grasp", kGrasp_s + 0.9, kEnd_s}};
 
-/// Tool 0 on the built-in scene: presses 6 mm, palpates once a second, grasps the membrane, and pulls it up and down.
+/// Tool 0 on the built-in scene: presses 6 mm, palpates once a second, taps twice a second, slides by 4 mm to and fro
+/// each second, 4 mm deep, grasps the membrane, and pulls it up and down.
 scene::SceneSettings LiveScene() {
   scene::SceneSettings settings = scene::BuiltIn();
   constexpr double kOpen = 0.87, kNeither = 0.35;
@@ -59,12 +65,22 @@ scene::SceneSettings LiveScene() {
   key(0, 0.4, place, 0.004, kNeither);
   key(0, 1.2, place, -0.006, kNeither);
   for (int i = 0; i < 7; ++i) key(0, 2.2 + 0.5 * i, place, i % 2 == 0 ? -0.006 : -0.003, kNeither);
-  key(0, 5.7, place, 0.010, kOpen);
+  for (int i = 0; i < 13; ++i) key(0, kTap_s + 0.25 * i, place, i % 2 == 0 ? 0.002 : -0.003, kNeither);
+  const auto slide = [&](double from_s, const Vec2f& way) {
+    for (int i = 0; i < 7; ++i) {
+      const Vec2f at = place + (i % 2 == 0 ? -0.5f : 0.5f) * way;
+      key(0, from_s + 0.5 * i, at, -0.004, kNeither);
+    }
+  };
+  const scene::MembraneSettings& membrane = settings.membrane;
+  slide(kAlong_s, Vec2f(0.004f / static_cast<float>(settings.tube.length_m), 0.0f));
+  slide(kAcross_s, Vec2f(0.0f, 0.004f / static_cast<float>(membrane.width_m)));
+  key(0, kGrasp_s - 1.0, place, 0.010, kOpen);
   key(0, kGrasp_s, place, -0.001, kOpen);
   key(0, kGrasp_s + 0.3, place, -0.001, 0);
-  for (int i = 0; i < 10; ++i) key(0, kGrasp_s + 0.9 + 0.5 * i, place, i % 2 == 0 ? 0.012 : 0.008, 0);
+  for (int i = 0; i < 11; ++i) key(0, kGrasp_s + 0.9 + 0.5 * i, place, i % 2 == 0 ? 0.012 : 0.008, 0);
   key(1, 0.0, Vec2f(0.62f, 0.42f), 0.020, 0);
-  settings.script_duration_s = 12;
+  settings.script_duration_s = kEnd_s;
   return settings;
 }
 
@@ -167,7 +183,7 @@ int Run(benchmark::Report* report) {
   }
   const std::vector<Vec3f> truth = Truth(scene, samples);
   double all_error = 0, all_truth = 0;
-  for (const Part& part : {kPress, kPalpate, kPull}) {
+  for (const Part& part : kParts) {
     double error = 0, size = 0, largest = 0;
     int unusual = 0, cheaper = 0;
     for (const Sample& sample : samples) {

@@ -130,7 +130,7 @@ TEST_F(OnSmallScene, ASheetCutInManyPlacesComesToRest) {
 }
 
 TEST_F(OnSmallScene, OneToolFeelsWhatTheOtherDoes) {
-  // Tool 0 presses 3 mm deep and stays; tool 1 then lifts the membrane beside it.
+  // The hook presses 3 mm deep and stays; the grasper then takes the membrane beside it and lifts it by 6 mm.
   TissueSimulation simulation(scene_);
   const auto node = [&](Index row, Index col) {
     return scene_.rest_position[scene_.membrane.first + row * scene_.membrane.cols + col];
@@ -142,18 +142,21 @@ TEST_F(OnSmallScene, OneToolFeelsWhatTheOtherDoes) {
     tool.present = true;
     tool.pose.q_WT = Quatf::FromTwoVectors(Vec3f::UnitZ(), inwards);
   }
+  ToolInput &grasper = tools[0], &hook = tools[1];
+  ASSERT_EQ(scene_.tools[0].kind, ToolKind::kGrasper);
   const auto smooth = [](float u) { return u * u * (3 - 2 * u); };
   const auto at = [&](float time) { return std::clamp(time, 0.0f, 1.0f); };
   float power = 0, pressed = 0, pulled = 0, jump = 0;
   Vec3f before = Vec3f::Zero();
   for (int i = 0; i < 300; ++i) {
     const float time = 0.01f * static_cast<float>(i);
-    tools[0].pose.jaw_rad = 0.35f;  // neither grasps nor lets go
-    tools[0].pose.p_WT = node(28, 10) + (-0.004f + 0.007f * smooth(at(time))) * inwards;
-    tools[1].pose.jaw_rad = time < 1.0f ? 0.6f : 0.0f;
-    tools[1].pose.p_WT = node(28, 16) + (0.001f - 0.008f * smooth(at(time - 1.5f))) * inwards;
+    hook.pose.p_WT = node(28, 10) + (-0.004f + 0.007f * smooth(at(time))) * inwards;
+    // The open jaws come down and close around the membrane.
+    grasper.pose.jaw_rad = time < 1.2f ? 0.9f : 0.0f;
+    grasper.pose.p_WT =
+        node(28, 16) + (-0.006f + 0.006f * smooth(at(time)) - 0.006f * smooth(at(time - 1.5f))) * inwards;
     simulation.Step(tools);
-    const DeviceContacts press = simulation.Contacts(0), pull = simulation.Contacts(1);
+    const DeviceContacts press = simulation.Contacts(1), pull = simulation.Contacts(0);
     ASSERT_LE(press.p_ext_W, 0.05f);
     if (time < 1.5f) {
       pressed = press.count > 0 ? press.contacts[0].f_ref.norm() : 0;
@@ -167,6 +170,7 @@ TEST_F(OnSmallScene, OneToolFeelsWhatTheOtherDoes) {
     }
     before = force;
   }
+  EXPECT_GT(simulation.grasp(0).held().size(), 5);
   EXPECT_GT(pressed, 0.02f);
   EXPECT_GT(pulled, 0.1f);
   EXPECT_LT(jump, 0.02f * pulled);  // At rest the force of a grasp is free of noise.
