@@ -14,8 +14,9 @@ namespace {
 /// Coarse nodes over the membrane. With those of the lattice they are a few dozen, so the factor has a few hundred
 /// rows. Assumed.
 constexpr int kCoarseRows = 9, kCoarseColumns = 4;
-/// Distance of the lattice's nodes over the organ [m]. Assumed.
-constexpr double kLattice_m = 0.030;
+/// Distance of the nodes of the lattice over the organ [m]: one of its radii. With 30 mm its soft wall, ovalling,
+/// converges slowly (deploy/docs/measurements/physics, Lattice over the organ).
+constexpr double kLattice_m = 0.018;
 /// Rows of the membrane, and afterwards columns of blocks of the factor, that one step adds to the next matrix.
 /// Complete every 60 steps instead of every 30, the error of a pull was two thirds larger
 /// (deploy/docs/measurements/physics).
@@ -218,7 +219,7 @@ void CoarseSpace::AddTubeMass(const ElasticModel& model) {
   }
 }
 
-/// The organ's matrix at rest: V dP = V (mu ((1 - a) dF + dF^T) + lambda_Lame tr(dF) I) at patches, and the edges.
+/// The organ's matrix at rest: V dP = V (mu ((1 - a_n) dF + dF^T) + lambda_Lame tr(dF) I) at patches, and the edges.
 void CoarseSpace::AddTube(const ElasticModel& model) {
   const double mu = model.mu_Pa, lambda = model.lambda_Pa;
   std::vector<std::pair<int, Vec3d>> gradients;
@@ -239,7 +240,7 @@ void CoarseSpace::AddTube(const ElasticModel& model) {
     }
     for (const auto& [a, ga] : gradients) {
       for (const auto& [b, gb] : gradients) {
-        const Mat3d block = patch.volume * ((1 - kPatchVariance) * mu * ga.dot(gb) * Mat3d::Identity() +
+        const Mat3d block = patch.volume * ((1 - patch.variance) * mu * ga.dot(gb) * Mat3d::Identity() +
                                             mu * gb * ga.transpose() + lambda * ga * gb.transpose());
         matrix_.constant.block<3, 3>(3 * a, 3 * b) += block.cast<float>();
       }

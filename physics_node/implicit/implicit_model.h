@@ -32,7 +32,7 @@ struct OrganModel {
   [[nodiscard]] Organ View() const;
 
   std::vector<std::uint32_t> start, vertex, patch_start, patch;
-  FloatArray gradient, patch_gradient, volume, mass;
+  FloatArray gradient, patch_gradient, volume, shear, mass;
   float mu, lambda;  ///< [Pa]
 };
 

@@ -125,8 +125,8 @@ struct Organ {
   const std::uint32_t* patch;
   const float* patch_gradient;
   const float* volume;  ///< Of a patch [m^3].
+  const float* shear;   ///< mu (1 - a_n) of a patch [Pa].
   float mu, lambda;     ///< lambda of the stable neo-Hookean energy: Lamé's + mu [Pa].
-  float variance;       ///< Part of mu that is taken off |F|^2, kPatchVariance.
   const float* mass;    ///< [kg]
 };
 

@@ -10,7 +10,7 @@
 //   curvature   p . A p = sum_n V dP_n : dF_n + sum edges k |p_i - p_j|^2 + sum m s |p|^2
 //
 //   x_j, g_j    position [m] of a vertex of the patch and its gradient [1/m]; sum_j g_j = 0
-//   V, mu, lambda, a   volume at rest [m^3]; moduli [Pa], lambda that of Lamé + mu; share of mu in the edges (0.25)
+//   V, mu, lambda, a   volume at rest [m^3]; moduli [Pa], lambda that of Lamé + mu; share of mu in the edges
 //   sigma       upper bound of the largest singular value of F
 //   k           in energy and curvature: stiffness of an edge in the variance term [N/m]; else isotropic stiffness [J]
 //   m, s        mass [kg], (1 + damping h) / h^2 [1/s^2]
@@ -169,7 +169,7 @@ inline void OrganLinearise(const Organ& organ, const OrganMatrix& matrix, const 
   ForGroups(first, last, gather, [&](Group& group) {
     const Matrix3<F> f = LoadColumns3<kGroupFloats, F>(group.data), cofactor = Cofactor(f);
     const F lambda = F::All(organ.lambda), mu = F::All(organ.mu), volume = F::Load(organ.volume + group.first);
-    const F shear = F::All((1.0f - organ.variance) * organ.mu);
+    const F shear = F::Load(organ.shear + group.first);
     const F j = Dot(f.c0, cofactor.c0), pressure = lambda * (j - F::All(1.0f)) - mu;
     const Matrix3<F> stress = {f.c0 * shear + cofactor.c0 * pressure, f.c1 * shear + cofactor.c1 * pressure,
                                f.c2 * shear + cofactor.c2 * pressure};
@@ -276,7 +276,7 @@ inline double OrganEnergy(const Organ& organ, const Inertia& inertia, const Orga
   ForGroups(first, last, gather, [&](Group& group) {
     const Matrix3<F> f = LoadColumns3<kGroupFloats, F>(group.data);
     const F j = Dot(f.c0, Cross(f.c1, f.c2)) - F::All(1.0f);
-    const F density = F::All(0.5f * organ.mu * (1.0f - organ.variance)) * (Dot(f, f) - F::All(3.0f)) -
+    const F density = F::All(0.5f) * F::Load(organ.shear + group.first) * (Dot(f, f) - F::All(3.0f)) -
                       F::All(organ.mu) * j + F::All(0.5f * organ.lambda) * (j * j);
     alignas(64) float of_patch[kPatchLanes];
     (density * F::Load(organ.volume + group.first)).Store(of_patch);

@@ -64,11 +64,13 @@ OrganModel::OrganModel(const ElasticModel& model, std::uint32_t vertices)
     : start(vertices + 1, 0),
       patch_start(vertices + 1, 0),
       volume(vertices + kPatchGroup),
+      shear(vertices + kPatchGroup),
       mass(vertices + kPatchGroup),
       mu(static_cast<float>(model.mu_Pa)),
       lambda(static_cast<float>(model.lambda_Pa + model.mu_Pa)) {
   for (const ElasticPatch& of_vertex : model.patches) {
     volume[of_vertex.vertex] = static_cast<float>(of_vertex.volume);
+    shear[of_vertex.vertex] = static_cast<float>((1 - of_vertex.variance) * model.mu_Pa);
     start[of_vertex.vertex + 1] = of_vertex.link_count;
   }
   for (const ElasticPatchLink& link : model.patch_links) {
@@ -129,9 +131,9 @@ Organ OrganModel::View() const {
           patch.data(),
           patch_gradient.data(),
           volume.data(),
+          shear.data(),
           mu,
           lambda,
-          static_cast<float>(kPatchVariance),
           mass.data()};
 }
 

@@ -73,8 +73,9 @@ scene::SceneSettings LiveScene() {
     }
   };
   const scene::MembraneSettings& membrane = settings.membrane;
-  slide(kAlong_s, Vec2f(0.004f / static_cast<float>(settings.tube.length_m), 0.0f));
-  slide(kAcross_s, Vec2f(0.0f, 0.004f / static_cast<float>(membrane.width_m)));
+  // The sheet's first coordinate runs across the organ, the second along it.
+  slide(kAlong_s, Vec2f(0.0f, 0.004f / static_cast<float>(settings.tube.length_m)));
+  slide(kAcross_s, Vec2f(0.004f / static_cast<float>(membrane.width_m), 0.0f));
   key(0, kGrasp_s - 1.0, place, 0.010, kOpen);
   key(0, kGrasp_s, place, -0.001, kOpen);
   key(0, kGrasp_s + 0.3, place, -0.001, 0);

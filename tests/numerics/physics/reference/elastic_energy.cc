@@ -203,7 +203,7 @@ double ElasticEnergy::Energy(const Points& x) const {
     const Mat3d F = PatchGradient(model_, patch, x);
     // The shear links contribute a mu/2 |F|^2, which is 3 a mu/2 per volume at rest; the patches subtract it.
     organ += patch.volume *
-             (TetEnergy(F, model_.mu_Pa, model_.lambda_Pa) - kPatchVariance * model_.mu_Pa / 2 * F.squaredNorm());
+             (TetEnergy(F, model_.mu_Pa, model_.lambda_Pa) - patch.variance * model_.mu_Pa / 2 * F.squaredNorm());
   }
   for (const ElasticShearLink& link : model_.shear_links) {
     organ += link.stiffness / 2 * (x.col(link.a) - x.col(link.b)).squaredNorm();
@@ -262,7 +262,7 @@ void ElasticEnergy::SpringGradient(const Points& x, Points* gradient) const {
 void ElasticEnergy::OrganGradient(const Points& x, Points* gradient) const {
   for (const ElasticPatch& patch : model_.patches) {
     const Mat3d F = PatchGradient(model_, patch, x);
-    const Mat3d P = patch.volume * (TetStress(F, model_.mu_Pa, model_.lambda_Pa) - kPatchVariance * model_.mu_Pa * F);
+    const Mat3d P = patch.volume * (TetStress(F, model_.mu_Pa, model_.lambda_Pa) - patch.variance * model_.mu_Pa * F);
     for (Index k = patch.first_link; k < patch.first_link + patch.link_count; ++k) {
       gradient->col(model_.patch_links[k].v).noalias() += P.lazyProduct(model_.patch_links[k].gradient);
     }
@@ -359,7 +359,7 @@ SparseMatrix ElasticEnergy::Hessian(const Points& x, bool positive) const {
   for (const ElasticPatch& patch : model_.patches) {
     const Matrix9d H =
         patch.volume * PatchHessian(PatchGradient(model_, patch, x), model_.mu_Pa, model_.lambda_Pa, positive);
-    const double variance = patch.volume * kPatchVariance * model_.mu_Pa;
+    const double variance = patch.volume * patch.variance * model_.mu_Pa;
     for (Index k = patch.first_link; k < patch.first_link + patch.link_count; ++k) {
       const ElasticPatchLink& p = model_.patch_links[k];
       Eigen::Matrix<double, 9, 3> column = Eigen::Matrix<double, 9, 3>::Zero();
