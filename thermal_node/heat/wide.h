@@ -2,8 +2,8 @@
 // code without contraction gives the same bits in all of them.
 #pragma once
 
-// Only for GCC: clones of clang 14 run AVX-512 on processors that do not have it, and cannot be called from other units.
-// Resolvers of cloned functions cannot run while a sanitizer starts. Other processors have the baseline only.
+// Only for GCC: clones of clang 14 run AVX-512 on processors that do not have it, and cannot be called from other
+// units. Resolvers of cloned functions cannot run while a sanitizer starts. Other processors have the baseline only.
 #if !defined(__x86_64__) || defined(__clang__) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define FULCRUM_WIDE
 #else
