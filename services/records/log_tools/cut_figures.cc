@@ -159,11 +159,25 @@ class TouchedPlaces {
   std::unordered_map<std::int64_t, std::vector<Vec2d>> cells_;
 };
 
-void MeasureCentreLine(CutMap* map) {
+/// [%]; NaN without a hole or without metal.
+double BeyondMetal(const CutMap& map, const TouchedPlaces& touched) {
+  int removed = 0, beyond = 0;
+  for (int y = 0; y < map.removed.height; ++y) {
+    for (int x = 0; x < map.removed.width; ++x) {
+      if (!map.removed.At(x, y)) continue;
+      ++removed;
+      beyond += touched.DistanceTo(map.ToSheet(Vec2d(x + 0.5, y + 0.5))) > kBesideMetal_m ? 1 : 0;
+    }
+  }
+  return removed > 0 && !touched.empty() ? 100.0 * beyond / removed : kNone;
+}
+
+void MeasureHoleAndCentreLine(CutMap* map) {
   const double texel_mm = 1e3 * map->recorded.texels.texel_m;
   CutFigures& figures = map->figures;
   figures.length_mm = texel_mm * map->centre_line.length();
   const TouchedPlaces touched(*map);
+  figures.beyond_metal_pct = BeyondMetal(*map, touched);
   std::vector<double> widths, off_way;
   for (const CentreLine::Stretch& stretch : map->centre_line.stretches) {
     for (const CentrePoint& point : stretch.points) {
@@ -203,7 +217,7 @@ void MeasureReported(CutMap* map) {
 void MeasureCut(CutMap* map) {
   MeasureWay(map);
   MeasureSpotWay(map);
-  MeasureCentreLine(map);
+  MeasureHoleAndCentreLine(map);
   MeasureReported(map);
   map->figures.revived = map->recorded.texels.revived;
   map->figures.first_opening_s = map->recorded.first_opening_s;

@@ -160,6 +160,7 @@ std::vector<std::pair<std::string, double>> FigureList(const CutFigures& f) {
           {"width_mm_p50", f.width_mm_p50},
           {"width_mm_p95", f.width_mm_p95},
           {"off_way_mm_p95", f.off_way_mm_p95},
+          {"beyond_metal_pct", f.beyond_metal_pct},
           {"spot_way_ratio", f.spot_way_ratio},
           {"length_mm", f.length_mm},
           {"longest_mm", f.longest_mm},

@@ -20,6 +20,10 @@ inline constexpr double kSmallestPiece_m2 = 4e-6;
 /// Smaller islands do not divide the centre line, because no metal can go around them [m^2].
 inline constexpr double kSmallestRound_m2 = 0.25e-6;
 
+/// Half of a hook's width and what its heat removes beside it [m]: tissue that a cut removes farther from the metal was
+/// removed by current that strayed. Assumed.
+inline constexpr double kBesideMetal_m = 0.8e-3;
+
 /// Figures of a cut. NaN: the recording contains nothing to measure the figure on.
 struct CutFigures {
   double removed_mm2 = 0;
@@ -34,6 +38,8 @@ struct CutFigures {
   double way_mm = 0;  ///< Length of the whole energised path.
   double width_mm_p05 = 0, width_mm_p50 = 0, width_mm_p95 = 0;
   double off_way_mm_p95 = 0;  ///< From the centre line to the nearest place where energised metal touched.
+  /// Share of the hole farther than kBesideMetal_m from every place that energised metal touched.
+  double beyond_metal_pct = 0;
   double spot_way_ratio = 0;  ///< Path length of the reported place of the current divided by that of the metal.
   double length_mm = 0;       ///< Length of the centre line, from end to end.
   double longest_mm = 0;      ///< Largest value of that length: cuts that merge have a shorter common line.

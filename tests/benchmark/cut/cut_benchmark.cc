@@ -261,9 +261,10 @@ class Bench {
 
  private:
   [[nodiscard]] bool WantsSummary() const {
-    constexpr const char* kSummary[] = {"islands",     "islands_mm2", "pieces",           "open_pct",
-                                        "width_mm",    "off_way_mm",  "spot_way_ratio",   "length_error_pct",
-                                        "jump_mm_max", "falls",       "thermal_step_p50", "thermal_step_p99"};
+    constexpr const char* kSummary[] = {"islands",         "islands_mm2", "pieces",         "open_pct",
+                                        "width_mm",        "off_way_mm",  "spot_way_ratio", "length_error_pct",
+                                        "beyond_metal",    "jump_mm_max", "falls",          "thermal_step_p50",
+                                        "thermal_step_p99"};
     return std::any_of(std::begin(kSummary), std::end(kSummary),
                        [&](const char* key) { return report_->Wants(std::string("cut.live.") + key); });
   }
@@ -297,6 +298,7 @@ class Bench {
     add("width_mm_p95", "mm", Quantile(values(usual, &CutFigures::width_mm_p95), 1));
     largest("width_mm_p95_all", "mm", &CutFigures::width_mm_p95);
     largest("off_way_mm_p95", "mm", &CutFigures::off_way_mm_p95);
+    largest("beyond_metal_pct", "%", &CutFigures::beyond_metal_pct);
     largest("spot_way_ratio", "1", &CutFigures::spot_way_ratio);
     largest("length_error_pct", "%", &CutFigures::length_error_pct);
     largest("jump_mm_max", "mm", &CutFigures::jump_mm_max);

@@ -232,10 +232,20 @@ TEST(CutMap, StraightCutFollowsItsMetal) {
   EXPECT_NEAR(figures.length_mm, 21.2, 0.03 * 21.2);
   EXPECT_NEAR(figures.width_mm_p50, 1.2, 0.1);
   EXPECT_LT(figures.off_way_mm_p95, 0.65);
+  EXPECT_DOUBLE_EQ(figures.beyond_metal_pct, 0);
   EXPECT_NEAR(figures.spot_way_ratio, 1, 1e-6);
   EXPECT_NEAR(figures.reported_length_mm, 21.2, 1e-4);
   EXPECT_EQ(figures.falls, 1);
   EXPECT_NEAR(figures.jump_mm_max, 11.8, 1e-4);
+}
+
+TEST(CutMap, CountsWhatIsRemovedBeyondTheMetal) {
+  Mask mask(200, 300);
+  Stroke(&mask, {{100, 50}, {100, 150}}, 6);
+  Stroke(&mask, {{140, 50}, {140, 150}}, 6);  // 4 mm beside it.
+  RecordedCut cut = SheetOf(mask);
+  AddWay(&cut, {10, 5}, {10, 15});
+  EXPECT_NEAR(MakeCutMap(std::move(cut)).figures.beyond_metal_pct, 50, 1e-9);
 }
 
 TEST(CutMap, NoiseOfTheSpotIsNoWayButItsLeapsAre) {
