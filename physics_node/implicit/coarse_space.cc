@@ -11,11 +11,11 @@
 namespace fulcrum::physics::implicit {
 namespace {
 
-/// Coarse nodes over the membrane. With those of the lattice they are a few dozen, so the factor has a few hundred
+/// Coarse nodes over the membrane. With those of the lattice they are some 250 in built-in, so the factor has some 750
 /// rows. Assumed.
 constexpr int kCoarseRows = 9, kCoarseColumns = 4;
-/// Distance of the nodes of the lattice over the organ [m]: one of its radii. With 30 mm its soft wall, ovalling,
-/// converges slowly (deploy/docs/measurements/physics, Lattice over the organ).
+/// Distance of the nodes of the lattice over the organ [m]: the outer radius of built-in. With 30 mm the organ's
+/// ovalling, which is soft, converges slowly (deploy/docs/measurements/physics, Lattice over the organ).
 constexpr double kLattice_m = 0.018;
 /// Rows of the membrane, and afterwards columns of blocks of the factor, that one step adds to the next matrix.
 /// Complete every 60 steps instead of every 30, the error of a pull was two thirds larger
