@@ -73,7 +73,7 @@ ContactProbe::Motion ContactProbe::MeanMotion(std::span<const Index> particles) 
   return mean;
 }
 
-ContactProbe::Motion ContactProbe::RingMotion(Index node) const {
+void ContactProbe::FindRing(Index node) {
   const auto cols = static_cast<int>(model_->cols()), rows = static_cast<int>(model_->rows());
   const int row = static_cast<int>(node) / cols, col = static_cast<int>(node) % cols;
   const auto steps = [&](int direction) {
@@ -82,8 +82,6 @@ ContactProbe::Motion ContactProbe::RingMotion(Index node) const {
   };
   const int dc = steps(0), dr = steps(1);
   const int diagonal_dr = dr * kDiagonalShare / kDiagonalWhole, diagonal_dc = dc * kDiagonalShare / kDiagonalWhole;
-  std::array<Index, 8> ring{};
-  std::size_t count = 0;
   for (const auto& [r, c] : {std::pair{-dr, 0},
                              {dr, 0},
                              {0, -dc},
@@ -95,11 +93,10 @@ ContactProbe::Motion ContactProbe::RingMotion(Index node) const {
     if (row + r >= 0 && row + r < rows && col + c >= 0 && col + c < cols) {
       const auto at = static_cast<Index>((row + r) * cols + col + c);
       if (model_->NodeAlive(at)) {
-        ring[count++] = scene_.membrane.first + at;
+        ring_.push_back(scene_.membrane.first + at);
       }
     }
   }
-  return MeanMotion({ring.data(), count});
 }
 
 void ContactProbe::Enter(ToolMemory* memory, ContactKind kind) const {
@@ -131,29 +128,42 @@ void ContactProbe::LowPass(ToolMemory* memory, const Vec3f& force, const Vec3f& 
   }
 }
 
-void ContactProbe::MedianFilter(ToolMemory* memory, const Vec3f& force) const {
-  const Vec3f limited = Limited(force, ContactProbe::kForceCap_N);
-  if (memory->kind == ContactKind::kGrasp) {
-    memory->force = limited;
-    memory->x_ref = memory->tip;
+float ContactProbe::Skin() const {
+  return std::clamp(kSkinOverEt * scene_.physics.membrane_Et_N_per_m, kMinSkin, kMaxSkin);
+}
+
+float ContactProbe::InSeries(std::uint32_t tool) const {
+  const Compliance& measured = compliance_.compliance(tool);
+  return 1.0f / (1.0f / Skin() + 1.0f / (measured.known ? measured.stiffness : tools_[tool].stiffness));
+}
+
+void ContactProbe::MedianFilter(std::uint32_t tool, const ToolForce& force) {
+  ToolMemory& memory = tools_[tool];
+  const ToolForce newest{Limited(force.force, ContactProbe::kForceCap_N), force.tip};
+  memory.x_ref = newest.tip;
+  if (memory.kind == ContactKind::kGrasp) {
+    memory.force = newest.force;
     return;
   }
-  if (std::exchange(memory->steps, 1) == 0) {
-    memory->forces.fill(limited);
-    memory->tips.fill(memory->tip);
+  if (std::exchange(memory.steps, 1) == 0) {
+    memory.forces.fill(newest);
   }
-  std::rotate(memory->forces.begin(), memory->forces.begin() + 1, memory->forces.end());
-  std::rotate(memory->tips.begin(), memory->tips.begin() + 1, memory->tips.end());
-  memory->forces.back() = limited;
-  memory->tips.back() = memory->tip;
+  std::rotate(memory.forces.begin(), memory.forces.begin() + 1, memory.forces.end());
+  memory.forces.back() = newest;
+  const float stiffness = InSeries(tool);
+  std::array<Vec3f, kMedian> now;
+  std::transform(memory.forces.begin(), memory.forces.end(), now.begin(), [&](const ToolForce& then) {
+    // Without pull: a surface only pushes.
+    const float push = memory.normal.dot(then.force);
+    const float change = stiffness * memory.normal.dot(then.tip - newest.tip);
+    return Vec3f(then.force + std::max(change, -std::max(push, 0.0f)) * memory.normal);
+  });
   for (int axis = 0; axis < 3; ++axis) {
-    std::array<float, kMedian> values;
-    std::transform(memory->forces.begin(), memory->forces.end(), values.begin(),
-                   [&](const Vec3f& f) { return f[axis]; });
-    std::nth_element(values.begin(), values.begin() + kMedian / 2, values.end());
-    memory->force[axis] = values[kMedian / 2];
+    std::nth_element(now.begin(), now.begin() + kMedian / 2, now.end(),
+                     [axis](const Vec3f& a, const Vec3f& b) { return a[axis] < b[axis]; });
+    memory.force[axis] = now[kMedian / 2][axis];
   }
-  memory->x_ref = memory->tips[kMedian / 2];
+  memory.force = Limited(memory.force, ContactProbe::kForceCap_N);
 }
 
 Contact ContactProbe::MakeContact(std::uint32_t tool) {
@@ -169,11 +179,11 @@ Contact ContactProbe::MakeContact(std::uint32_t tool) {
   contact.u_c = memory.u;
   contact.du_c = memory.du;
   contact.v_s = memory.v_s;
-  contact.k1 = std::clamp(kSkinOverEt * params.membrane_Et_N_per_m, kMinSkin, kMaxSkin);
+  contact.k1 = Skin();
   contact.kt = kTangentialOverSkin * contact.k1;
   contact.k_body = memory.stiffness;
   contact.b_body = kRelaxation * memory.stiffness;
-  const Compliance& measured = compliance_.Update(tool, memory.touched, memory.normal, solver_);
+  const Compliance& measured = compliance_.Update(tool, memory.touched, ring_, memory.normal, solver_);
   if (measured.known) {
     contact.k_body = measured.stiffness;
     contact.b_body = measured.viscosity;
@@ -194,14 +204,15 @@ void ContactProbe::Reset(std::uint32_t tool, const ToolPose& pose) {
 }
 
 DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision,
-                                    const Grasp& grasp, const Vec3f* solver_force) {
+                                    const Grasp& grasp, const ToolForce* solver_force) {
   ToolMemory& memory = tools_[tool];
   memory.x_ref = pose.p_WT;
   const Vec3f tool_velocity = (pose.p_WT - std::exchange(memory.tip, pose.p_WT)) / scene_.physics.dt_s;
+  ring_.clear();
   DeviceContacts device;
   device.force_cap_N = ContactProbe::kForceCap_N;
   const auto force = [&] {
-    return solver_force == nullptr || memory.touched.empty() ? elastic_.OnSet(memory.touched) : *solver_force;
+    return solver_force == nullptr || memory.touched.empty() ? elastic_.OnSet(memory.touched) : solver_force->force;
   };
   const auto enter = [&](ContactKind kind) {
     if (memory.kind != kind) {
@@ -220,7 +231,7 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
     std::sort(memory.touched.begin(), memory.touched.end());
     LowPass(&memory, force(), MeanMotion(memory.touched).displacement);
     if (solver_force != nullptr) {
-      MedianFilter(&memory, *solver_force);
+      MedianFilter(tool, *solver_force);
       memory.u = MeanMotion(memory.touched).displacement;
       memory.du = Limited(tool_velocity, kMaxRate);  // Held tissue moves with the tool.
     }
@@ -261,7 +272,12 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
 
   Motion around;
   if (nearest.found && nearest.on_membrane) {
-    around = RingMotion(model_->TriangleNodes(nearest.triangle)[0]);
+    FindRing(model_->TriangleNodes(nearest.triangle)[0]);
+    around = MeanMotion(ring_);
+  }
+  if (solver_ != nullptr && touching) {
+    const float follows = compliance_.compliance(tool).follow;
+    around.velocity -= follows * memory.normal.dot(tool_velocity) * memory.normal;
   }
   const float share = scene_.physics.dt_s / (scene_.physics.dt_s + kFilterTime);
   memory.v_s += share * (Limited(around.velocity, kMaxSurroundings) - memory.v_s);
@@ -270,7 +286,7 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
 
   memory.steps = touching ? memory.steps : 0;
   if (solver_force != nullptr && touching) {
-    MedianFilter(&memory, *solver_force);
+    MedianFilter(tool, *solver_force);
     memory.du = Limited(memory.normal.dot(tool_velocity) * memory.normal, kMaxRate);
   }
   Contact contact = MakeContact(tool);

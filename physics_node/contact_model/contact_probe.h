@@ -2,8 +2,9 @@
 // force, and the dependence of the force on the position of the tool.
 //
 //   f_ref   force of the tissue on the tool [N]. With the force of the solver: of a grasp unfiltered; of a surface the
-//           median of the last kMedian steps, with x_ref the tip position of the middle step. Else the elastic force of
-//           the edges of the touched or held particles (elastic_force.h), low-passed over kFilterTime
+//           median of the last kMedian steps, older ones changed by the stiffness for the way of the tip since then,
+//           with x_ref the mean place of the tip in the last step, as f_ref is a mean. Else the elastic force of the
+//           edges of the touched or held particles (elastic_force.h), low-passed over kFilterTime
 //   u_c     displacement of the tissue at the contact relative to its surroundings, a ring at kRingRadius [m]: a tent
 //           raised by the other tool is no dent of this one
 //   k1, kt  skin [N/m]: a small disc of the membrane resists with E t independent of its size
@@ -13,6 +14,9 @@
 //   b_body  kRelaxation k_body [N s/m]
 //   kappa   curvatures [1/m] of the surface without this tool, as for u_c and p_s: before touch of the present shape,
 //           in contact of the shape at rest (the present one has the dent), for the middle of a tip that rolls on it
+//
+// v_s     velocity of the surroundings, the ring of u_c [m/s]. Where k_body is that of the solver, which includes all
+//         that yields, without the part with which the ring follows this tool
 //
 // k_body and b_body come from a ComplianceSolver where the solver has one. Low-pass filters: y += h / (h + T) (x - y)
 // with the step h and the time constant T = kFilterTime [s].
@@ -29,6 +33,12 @@
 
 namespace fulcrum::physics {
 
+/// Mean force of the tissue on a tool over a time, and the mean place of its tip meanwhile.
+struct ToolForce {
+  Vec3f force = Vec3f::Zero();  ///< [N]
+  Vec3f tip = Vec3f::Zero();    ///< Frame W [m].
+};
+
 class ContactProbe {
  public:
   /// Largest published force on a tool [N]; a larger one damages rectal tissue.
@@ -36,10 +46,10 @@ class ContactProbe {
 
   ContactProbe(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles);
 
-  /// Contacts of one tool after a step: a grasp, or the nearest surface within range, or none. `solver_force`: force of
-  /// the tissue on the tool from the solver [N]; null: estimated from the edges.
+  /// Contacts of one tool after a step: a grasp, or the nearest surface within range, or none. `solver_force`: from
+  /// the solver, over the last step; null: estimated from the edges.
   DeviceContacts Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision, const Grasp& grasp,
-                        const Vec3f* solver_force);
+                        const ToolForce* solver_force);
   /// Before an Update that does not directly follow the last one: discards the history of the filters.
   void Reset(std::uint32_t tool, const ToolPose& pose);
   /// Source of stiffness and viscosity; nullptr: estimated from force and dent.
@@ -49,7 +59,7 @@ class ContactProbe {
   [[nodiscard]] Vec3f force(std::uint32_t tool) const { return tools_[tool].force; }
 
  private:
-  static constexpr int kMedian = 5;  ///< Steps of the median filter of a surface's force.
+  static constexpr int kMedian = 3;  ///< Steps of the median filter of a surface's force.
   struct ToolMemory {
     ContactKind kind = ContactKind::kNone;
     std::uint32_t id = 0;
@@ -58,10 +68,10 @@ class ContactProbe {
     Vec3f u = Vec3f::Zero(), du = Vec3f::Zero(), v_s = Vec3f::Zero();
     float stiffness = 0;
     std::vector<Index> touched;
-    Vec3f tip = Vec3f::Zero();                ///< Of the tool in the last step.
-    Vec3f x_ref = Vec3f::Zero();              ///< Tip position at which `force` acted.
-    std::array<Vec3f, kMedian> forces, tips;  ///< Of the last steps, the newest last.
-    int steps = 0;                            ///< 0: both are empty.
+    Vec3f tip = Vec3f::Zero();              ///< Of the tool in the last step.
+    Vec3f x_ref = Vec3f::Zero();            ///< Tip position at which `force` acted.
+    std::array<ToolForce, kMedian> forces;  ///< Of the last steps, the newest last.
+    int steps = 0;                          ///< 0: it is empty.
   };
   /// Displacement from rest and velocity, averaged.
   struct Motion {
@@ -70,10 +80,14 @@ class ContactProbe {
 
   void Enter(ToolMemory* memory, ContactKind kind) const;
   void LowPass(ToolMemory* memory, const Vec3f& force, const Vec3f& u) const;
-  void MedianFilter(ToolMemory* memory, const Vec3f& force) const;
+  void MedianFilter(std::uint32_t tool, const ToolForce& force);
   [[nodiscard]] Motion MeanMotion(std::span<const Index> particles) const;
-  [[nodiscard]] Motion RingMotion(Index node) const;
+  /// Sets `ring_` to the nodes around one.
+  void FindRing(Index node);
   [[nodiscard]] Contact MakeContact(std::uint32_t tool);
+  /// k1 of a surface, and of skin and body in series [N/m].
+  [[nodiscard]] float Skin() const;
+  [[nodiscard]] float InSeries(std::uint32_t tool) const;
 
   TissueScene scene_;
   const TissueModel* model_;
@@ -81,6 +95,7 @@ class ContactProbe {
   ElasticForce elastic_;
   SurfaceCurvature curvature_;
   std::array<ToolMemory, kMaxTools> tools_;
+  std::vector<Index> ring_;  ///< Surroundings of the contact of the tool in work.
   ComplianceProbe compliance_;
   ComplianceSolver* solver_ = nullptr;
 };

@@ -22,11 +22,11 @@ constexpr float kContactDamping = 1.0f;
 /// Viscosity against sliding over normal stiffness, at most [s]: 0.6 N s/m at a tool. A time and not a share of the
 /// stiffness: with a stiffness per substep, what sticks creeps slowly in long substeps and at once in short ones.
 constexpr float kSlideTime_s = 3e-4f;
-/// Depth over which the contact of a tool gets stiff [m]: more than a tool moves in a substep (0.06 mm at most while it
-/// presses). Contacts that are stiff at once come and go all together: in one substep some are missing from the
-/// linearisation, in the next they push back what fell in meanwhile, and the force of a tool that moves along a
-/// surface, if only by the rounding of its position, jumps by more than itself.
-constexpr float kOnsetDepth_m = 8e-5f;
+/// Depth over which the contact of a tool gets stiff: at least kOnsetDepth_m, and kOnsetOverPath times the tool's way
+/// in the substep, but at most kMostOnset_m. Contacts that are stiff at once come and go all together: in one substep
+/// some are missing from the linearisation, in the next they push back what fell in meanwhile, and the force of a tool
+/// that moves along a surface, if only by the rounding of its position, jumps by more than itself.
+constexpr float kOnsetDepth_m = 8e-5f, kOnsetOverPath = 3.0f, kMostOnset_m = 1e-3f;
 /// Least length of a binding that is divided by [m].
 constexpr float kLeastBindingLength_m = 1e-9f;
 
@@ -96,7 +96,9 @@ struct Elastic {
   float energy;     ///< E [J]
 };
 Elastic ElasticOf(const ContactRow& row, float depth) {
-  const float full = Elements::ContactStiffness(row), onset = Elements::IsTissue(row) ? 0.0f : kOnsetDepth_m;
+  const float full = Elements::ContactStiffness(row);
+  const float onset =
+      Elements::IsTissue(row) ? 0.0f : std::clamp(kOnsetOverPath * row.drift.norm(), kOnsetDepth_m, kMostOnset_m);
   if (depth < onset) {
     const float stiffness = full * depth / onset;
     return {0.5f * stiffness * depth, stiffness, stiffness * depth * depth / 6.0f};

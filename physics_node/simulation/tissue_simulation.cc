@@ -9,10 +9,10 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Path of a pressing tool in a substep of mode accurate [m]: the fine one is kept with up to kFineSubsteps substeps
-/// and gives accurate forces, the larger one with up to kMostSubsteps and keeps the forces usable.
-constexpr float kFinePathPerSubstep = 2e-5f, kMaxPathPerSubstep = 6e-5f;
-constexpr int kFineSubsteps = 3, kMostSubsteps = 8;
+/// Path of a pressing tool in a substep of mode accurate [m], kept with up to kMostSubsteps. More substeps change the
+/// force by little, because contacts soften with the path (implicit/elements.cc), and a late step loses more.
+constexpr float kPathPerSubstep = 2e-5f;
+constexpr int kMostSubsteps = 4;
 /// Least substeps while a tool presses: with one per step the error of the force is half of it at any speed of the
 /// tool.
 constexpr int kLeastSubsteps = 2;
@@ -42,7 +42,6 @@ TissueSimulation::TissueSimulation(const TissueScene& scene, int threads, Instru
     } else {
       implicit_.emplace(scene, elastic, model_, &particles_, threads, implicit::KernelsFor(set));
       effort_ = implicit::EffortOf(scene.physics.preset);
-      most_substeps_ = std::max(kMostSubsteps, effort_.substeps);
       contacts_.SetComplianceSolver(&implicit_compliance_);
     }
     held_places_.reserve(particles_.particle_count());
@@ -50,18 +49,27 @@ TissueSimulation::TissueSimulation(const TissueScene& scene, int threads, Instru
   }
 }
 
-bool TissueSimulation::ImplicitCompliance::Stiffness(const Probe& probe, float horizon_s, float* newton_per_m) {
+bool TissueSimulation::ImplicitCompliance::Stiffness(const Probe& probe, float horizon_s, ProbeAnswer* answer) {
   // Tools take turns: half, then a quarter of the period apart.
   const std::uint64_t turn = probe.tool % 2 * (kQueryEvery / 2) + probe.tool / 2 * (kQueryEvery / 4);
   if ((simulation_->counters_.steps + turn) % kQueryEvery != 0) {
     return false;
   }
-  at_.clear();
-  for (const Index particle : probe.particles) {
-    at_.push_back(simulation_->particles_.Ref(particle));
-  }
+  const auto refs = [&](std::span<const Index> particles, std::vector<ParticleRef>* at) {
+    at->clear();
+    for (const Index particle : particles) {
+      at->push_back(simulation_->particles_.Ref(particle));
+    }
+  };
+  refs(probe.particles, &at_);
+  refs(probe.around, &around_);
   const std::size_t number = 2 * probe.tool + (horizon_s > 0.0f ? 1 : 0);
-  return simulation_->implicit_->Stiffness({at_, probe.direction, horizon_s, number}, newton_per_m);
+  implicit::StiffnessAnswer of_solver;
+  if (!simulation_->implicit_->Stiffness({at_, around_, probe.direction, horizon_s, number}, &of_solver)) {
+    return false;
+  }
+  *answer = {of_solver.newton_per_m, of_solver.follow};
+  return true;
 }
 
 /// Contacts of tissue with tissue and its surroundings, for the step that ends at the present time.
@@ -167,9 +175,8 @@ int TissueSimulation::SubstepsForTools() const {
   if (path == 0.0f) {
     return effort_.substeps;
   }
-  const int fine = std::min(static_cast<int>(std::ceil(path / kFinePathPerSubstep)), kFineSubsteps);
-  const int needed = std::max(static_cast<int>(std::ceil(path / kMaxPathPerSubstep)), fine);
-  return std::clamp(needed, std::max(effort_.substeps, kLeastSubsteps), most_substeps_);
+  const int least = std::max(effort_.substeps, kLeastSubsteps);
+  return std::clamp(static_cast<int>(std::ceil(path / kPathPerSubstep)), least, std::max(least, kMostSubsteps));
 }
 
 StepReport TissueSimulation::StepAccurate() {
@@ -198,7 +205,10 @@ StepReport TissueSimulation::StepAccurate() {
     const implicit::SubstepReport substep = implicit_->Substep(h, iterations, held_places_, rows_);
     collision_.TakeForces(rows_);
     for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
-      tool_force_[tool] += (collision_.force(tool) - tool_force_[tool]) / static_cast<float>(i + 1);
+      const float share = 1.0f / static_cast<float>(i + 1);
+      ToolForce& mean = tool_force_[tool];
+      mean.force += share * (collision_.force(tool) - mean.force);
+      mean.tip += share * (Interpolate(tracks_[tool].last, tracks_[tool].now, u1).p_WT - mean.tip);
     }
     report.resets += substep.resets;
     largest_speed_ = substep.largest_speed_m_s;
@@ -210,7 +220,7 @@ StepReport TissueSimulation::StepAccurate() {
       traction += implicit_->ForceOn(particles_.Ref(held.particle));
     }
     if (grasps_[i].holding()) {
-      tool_force_[i] = traction;
+      tool_force_[i] = {traction, tracks_[i].now.p_WT};
     }
     grasps_[i].Slip(traction, scene_.tools[i], tracks_[i].now, model_, &particles_);
   }
@@ -261,7 +271,6 @@ std::uint32_t TissueSimulation::SetCheaper(std::uint32_t presets) {
   const auto own = implicit_ ? static_cast<std::uint32_t>(scene_.physics.preset) : 0u;
   const std::uint32_t cheaper = std::min(presets, own);
   effort_ = implicit::EffortOf(static_cast<PhysicsPreset>(own - cheaper));
-  most_substeps_ = std::max(cheaper > 0 ? kLeastSubsteps : kMostSubsteps, effort_.substeps);
   return cheaper;
 }
 

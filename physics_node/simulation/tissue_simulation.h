@@ -81,7 +81,7 @@ class TissueSimulation {
   /// Force of the tissue on a tool as in the last Contacts [N].
   [[nodiscard]] Vec3f force(std::uint32_t tool) const { return contacts_.force(tool); }
   /// In mode accurate: force of the tissue on a tool in the last step, not filtered over steps [N].
-  [[nodiscard]] Vec3f solver_force(std::uint32_t tool) const { return tool_force_[tool]; }
+  [[nodiscard]] Vec3f solver_force(std::uint32_t tool) const { return tool_force_[tool].force; }
   /// Tears by traction. Torn edges transmit forces until ApplyTopology severs them.
   [[nodiscard]] const TearWatch& tears() const { return tears_; }
   [[nodiscard]] bool asleep() const { return sleep_.asleep; }
@@ -115,11 +115,11 @@ class TissueSimulation {
    public:
     static constexpr std::uint64_t kQueryEvery = 8;
     explicit ImplicitCompliance(TissueSimulation* simulation) : simulation_(simulation) {}
-    bool Stiffness(const Probe& probe, float horizon_s, float* newton_per_m) override;
+    bool Stiffness(const Probe& probe, float horizon_s, ProbeAnswer* answer) override;
 
    private:
     TissueSimulation* simulation_;
-    std::vector<ParticleRef> at_;
+    std::vector<ParticleRef> at_, around_;
   };
 
   struct ToolTrack {
@@ -153,13 +153,11 @@ class TissueSimulation {
   std::optional<implicit::ImplicitSolver> implicit_;  ///< In mode accurate.
   std::optional<xpbd::XpbdSolver> xpbd_;              ///< In mode xpbd.
   implicit::Effort effort_;
-  int most_substeps_ = 1;  ///< Largest number of substeps, for a pressing tool.
   std::vector<implicit::HeldPlace> held_places_;
   std::vector<ContactRow> rows_;
-  std::vector<float> moved_;  ///< By block of particles: movement in the last step [m].
-  /// Force of the tissue on a tool, mean over the substeps of the last step; mode accurate [N].
-  std::array<Vec3f, kMaxTools> tool_force_ = AtOrigin();
-  float largest_speed_ = 0;  ///< Of the tissue in the last step; not in mode paper [m/s].
+  std::vector<float> moved_;                     ///< By block of particles: movement in the last step [m].
+  std::array<ToolForce, kMaxTools> tool_force_;  ///< Means over the substeps of the last step, in mode accurate.
+  float largest_speed_ = 0;                      ///< Of the tissue in the last step; not in mode paper [m/s].
   ToolCollision collision_;
   TissueCollision tissue_collision_;
   std::array<Grasp, kMaxTools> grasps_;

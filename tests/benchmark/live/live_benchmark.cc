@@ -1,5 +1,6 @@
-// Force at the hand with the real physics_node over DDS, against the same physics run at 1 kHz in this process with the
-// tool poses that the session published.
+// Force at the hand with the real physics_node over DDS (haptics.live*), and with servo and physics in this process
+// and simulated time, where no step runs late (haptics.in_time*); both against the same physics run at 1 kHz with the
+// tool poses that the servo published.
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,6 +15,8 @@
 #include <thread>
 #include <vector>
 
+#include "haptics_node/device/simulated_device.h"
+#include "haptics_node/servo/servo.h"
 #include "physics_node/simulation/tissue_simulation.h"
 #include "services/base/core/operator_script.h"
 #include "services/base/runtime/cyclic_thread.h"
@@ -88,11 +91,13 @@ scene::SceneSettings LiveScene() {
 struct Sample {
   double time_s;
   ToolSample tool;
-  bool cheaper;  ///< Physics reports that it ran late and uses a cheaper preset.
+  bool cheaper;            ///< Physics reports that it ran late and uses a cheaper preset.
+  std::uint64_t overruns;  ///< Of physics since its start, as last reported: periods without a step.
 };
 
 /// Runs the session and returns the samples that the servo published for tool 0.
-std::vector<Sample> Record(const SceneView& scene, const std::filesystem::path& folder) {
+/// @param step of physics_node, as last reported.
+std::vector<Sample> Record(const SceneView& scene, const std::filesystem::path& folder, TimingSummary* step) {
   bus::DdsParticipant participant({.domain = kDomain, .node_name = "benchmark", .shared_memory = {}});
   const auto manifests = participant.MakeOutput<SceneManifest>();
   const auto handles = participant.MakeOutput<HandleState>();
@@ -122,6 +127,7 @@ std::vector<Sample> Record(const SceneView& scene, const std::filesystem::path& 
   std::vector<Sample> samples;
   ToolState state;
   bool cheaper = false;
+  std::uint64_t overruns = 0;
   for (double time_s = 0; time_s < scene.script_duration_s;) {
     const std::int64_t now = runtime::MonotonicNs();
     time_s = 1e-9 * static_cast<double>(now - start);
@@ -133,14 +139,61 @@ std::vector<Sample> Record(const SceneView& scene, const std::filesystem::path& 
     handles->Write(handle);
     while (healths->TakeNext(&health)) {
       if (health.node == NodeId::kPhysics) {
+        overruns = health.overruns;
+        *step = health.step;
         cheaper = std::any_of(health.metrics.begin(), health.metrics.end(),
                               [](const Metric& metric) { return metric.name == "cheaper_presets"; });
       }
     }
     while (tools->TakeNext(&state)) {
-      samples.push_back({1e-9 * static_cast<double>(state.stamp.stamp_ns - start), state.tools[0], cheaper});
+      samples.push_back({1e-9 * static_cast<double>(state.stamp.stamp_ns - start), state.tools[0], cheaper, overruns});
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return samples;
+}
+
+/// Pose of tool 0 as physics takes it.
+physics::ToolInput InputOf(const SceneView& scene, const Sample& sample, double time_s) {
+  physics::ToolInput input;
+  input.present = sample.tool.kind != ToolKind::kNone;
+  input.pose.p_WT = sample.tool.p_WT;
+  input.pose.q_WT = sample.tool.q_WT.normalized();
+  input.pose.jaw_rad = EvaluateScript(scene.script, 0, time_s).jaw_rad;
+  return input;
+}
+
+/// The same session without processes and clock: a step of physics begins kWake_ms after its session time, and its
+/// contact model arrives kModel_ms after that time. Tool 0 alone.
+std::vector<Sample> Simulate(const SceneView& scene) {
+  constexpr int kWake_ms = 1, kModel_ms = 7;
+  constexpr std::int64_t kStart_ns = 1'000'000'000, kMs_ns = 1'000'000;
+  const auto device = haptics::MakeScriptedDevice(scene, 0, haptics::HandModel(scene.haptics));
+  haptics::Servo servo(haptics::ServoSettingsOf(scene), {device.get()});
+  physics::TissueSimulation simulation(scene);
+  const int period_ms = static_cast<int>(std::lround(1e3f * scene.physics.dt_s));
+  std::vector<Sample> samples;
+  ContactModel model;
+  model.stamp.epoch = 1;
+  model.physics_dt_s = scene.physics.dt_s;
+  for (int ms = 0; ms < static_cast<int>(1e3 * scene.script_duration_s); ++ms) {
+    Tick tick;
+    tick.index = static_cast<std::uint64_t>(ms);
+    tick.dt_s = 1e-3;
+    tick.session_time_s = 1e-3 * ms;
+    tick.stamp_ns = kStart_ns + ms * kMs_ns;
+    if (ms % period_ms == kModel_ms) servo.OfferModel(model, tick.stamp_ns);
+    servo.Step(tick);
+    samples.push_back({tick.session_time_s, servo.record().tool.tools[0], false, 0});
+    if (ms % period_ms == kWake_ms) {
+      const int of_ms = ms - kWake_ms;
+      const auto at = static_cast<std::size_t>(of_ms);
+      (void)simulation.Step({InputOf(scene, samples[at], samples[at].time_s)});
+      model.devices[0] = simulation.Contacts(0);
+      model.tool_sequence = ++model.stamp.sequence;
+      model.stamp.stamp_ns = tick.stamp_ns;
+      model.tool_stamp_ns = kStart_ns + of_ms * kMs_ns;
+    }
   }
   return samples;
 }
@@ -151,16 +204,11 @@ std::vector<Vec3f> Truth(SceneView scene, const std::vector<Sample>& samples) {
   scene.physics.preset = PhysicsPreset::kFast;  // one substep a millisecond
   physics::TissueSimulation simulation(scene);
   std::vector<Vec3f> forces;
-  std::array<physics::ToolInput, kMaxTools> inputs;
   std::size_t at = 0;
   for (int ms = 0; ms < static_cast<int>(1e3 * scene.script_duration_s); ++ms) {
     const double time_s = 1e-3 * ms;
     while (at + 1 < samples.size() && samples[at + 1].time_s <= time_s) ++at;
-    inputs[0].present = samples[at].tool.kind != ToolKind::kNone;
-    inputs[0].pose.p_WT = samples[at].tool.p_WT;
-    inputs[0].pose.q_WT = samples[at].tool.q_WT.normalized();
-    inputs[0].pose.jaw_rad = EvaluateScript(scene.script, 0, time_s).jaw_rad;
-    (void)simulation.Step(inputs);
+    (void)simulation.Step({InputOf(scene, samples[at], time_s)});
     const DeviceContacts contacts = simulation.Contacts(0);
     Vec3f force = Vec3f::Zero();
     for (std::uint32_t i = 0; i < contacts.count; ++i) force += contacts.contacts[i].f_ref;
@@ -169,45 +217,63 @@ std::vector<Vec3f> Truth(SceneView scene, const std::vector<Sample>& samples) {
   return forces;
 }
 
-int Run(benchmark::Report* report) {
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("bench_live." + std::to_string(::getpid()));
-  std::filesystem::create_directories(folder);
-  scene::WriteSceneFile(scene::BuildProcedural(LiveScene()), "name: built-in\n", folder / "scene");
-  const scene::SceneFile file(folder / "scene");
-  const SceneView& scene = file.view();
-  const std::vector<Sample> samples = Record(scene, folder);
-  std::filesystem::remove_all(folder);
-  if (samples.empty()) {
-    std::fprintf(stderr, "bench_live: haptics_node and physics_node did not come up within %.0f s\n", kPatience_s);
-    return 1;
-  }
+/// @param name of the keys, after "haptics.".
+void AddErrors(const SceneView& scene, const std::string& name, const std::vector<Sample>& samples,
+               benchmark::Report* report) {
   const std::vector<Vec3f> truth = Truth(scene, samples);
   double all_error = 0, all_truth = 0;
   for (const Part& part : kParts) {
     double error = 0, size = 0, largest = 0;
     int unusual = 0, cheaper = 0;
+    std::uint64_t first_overruns = ~std::uint64_t{0}, overruns = 0;
     for (const Sample& sample : samples) {
       const int ms = static_cast<int>(std::lround(1e3 * sample.time_s));
       if (sample.time_s < part.from_s || sample.time_s >= part.to_s || ms >= static_cast<int>(truth.size())) continue;
       unusual += sample.tool.state == ServoState::kNormal ? 0 : 1;
       cheaper += sample.cheaper ? 1 : 0;
+      first_overruns = std::min(first_overruns, sample.overruns);
+      overruns = sample.overruns - first_overruns;
       // The published force is scaled for the hand.
       const Vec3f felt = sample.tool.f_W / scene.haptics.force_scale;
       error += (felt - truth[ms]).squaredNorm();
       size += truth[ms].squaredNorm();
       largest = std::max<double>(largest, truth[ms].norm());
     }
-    const std::string stem = std::string("haptics.live_force_error_pct.") + part.name;
-    report->Add(stem, 100 * std::sqrt(error / size), "%");
-    report->Add(std::string("haptics.live.") + part.name + ".largest_N", largest, "N");
-    report->Add(std::string("haptics.live.") + part.name + ".ticks_not_normal", unusual, "1");
-    report->Add(std::string("haptics.live.") + part.name + ".ticks_cheaper", cheaper, "1");
+    const std::string stem = "haptics." + name + "." + part.name + ".";
+    report->Add("haptics." + name + "_force_error_pct." + part.name, 100 * std::sqrt(error / size), "%");
+    report->Add(stem + "largest_N", largest, "N");
+    report->Add(stem + "ticks_not_normal", unusual, "1");
+    report->Add(stem + "ticks_cheaper", cheaper, "1");
+    report->Add(stem + "overruns", static_cast<double>(overruns), "1");
     all_error += error;
     all_truth += size;
   }
-  report->Add("haptics.live_force_error_pct", 100 * std::sqrt(all_error / all_truth), "%");
+  report->Add("haptics." + name + "_force_error_pct", 100 * std::sqrt(all_error / all_truth), "%");
+}
+
+int RunLive(benchmark::Report* report) {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("bench_live." + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  scene::WriteSceneFile(scene::BuildProcedural(LiveScene()), "name: built-in\n", folder / "scene");
+  const scene::SceneFile file(folder / "scene");
+  TimingSummary step;
+  const std::vector<Sample> samples = Record(file.view(), folder, &step);
+  std::filesystem::remove_all(folder);
+  if (samples.empty()) {
+    std::fprintf(stderr, "bench_live: haptics_node and physics_node did not come up within %.0f s\n", kPatience_s);
+    return 1;
+  }
+  AddErrors(file.view(), "live", samples, report);
+  report->Add("haptics.live.physics_step_ms_p50", 1e-3 * static_cast<double>(step.p50_us), "ms");
+  report->Add("haptics.live.physics_step_ms_p99", 1e-3 * static_cast<double>(step.p99_us), "ms");
   return 0;
+}
+
+void RunInTime(benchmark::Report* report) {
+  const scene::SceneData data = scene::BuildProcedural(LiveScene());
+  const SceneView scene = data.View();
+  AddErrors(scene, "in_time", Simulate(scene), report);
 }
 
 }  // namespace
@@ -215,5 +281,6 @@ int Run(benchmark::Report* report) {
 
 int main(int argc, char** argv) {
   fulcrum::benchmark::Report report(argc, argv);
-  return report.Wants("haptics.live") ? fulcrum::Run(&report) : 0;
+  if (report.Wants("haptics.in_time")) fulcrum::RunInTime(&report);
+  return report.Wants("haptics.live") ? fulcrum::RunLive(&report) : 0;
 }

@@ -142,6 +142,42 @@ TEST_P(DeepTools, AcrossEachOther) {
   ExpectRecovery();
 }
 
+/// Largest force on tool 0 of `scene`, if each `missed`-th period has no step; 0: none is missed.
+float PeakForce(const SceneView& scene, int missed) {
+  TissueSimulation simulation(scene);
+  float peak = 0;
+  for (int i = 0; i < static_cast<int>(scene.script_duration_s / scene.physics.dt_s); ++i) {
+    if (missed > 0 && i % missed == missed - 1) {
+      continue;
+    }
+    (void)simulation.Step(ScriptedTools(scene, static_cast<double>(scene.physics.dt_s) * i));
+    const DeviceContacts device = simulation.Contacts(0);
+    peak = std::max(peak, device.count > 0 ? device.contacts[0].f_ref.norm() : 0.0f);
+  }
+  return peak;
+}
+
+TEST(LateTools, TapsPressLittleHarderWherePeriodsAreMissed) {
+  scene::SceneSettings settings = scene::BuiltIn();
+  settings.script.clear();
+  for (int i = 0; i < 9; ++i) {
+    scene::ScriptKeySettings& key = settings.script.emplace_back();
+    key.time_s = 0.25 * i;
+    key.sheet = Vec2f(0.40f, 0.5f);
+    key.height_m = i % 2 == 0 ? 0.002f : -0.003f;
+    key.jaw_rad = 0.35f;
+  }
+  settings.script_duration_s = 2.0;
+  const scene::SceneData data = scene::BuildProcedural(settings);
+  const float in_time = PeakForce(data.View(), 0);
+  ASSERT_GT(in_time, 0.1f);
+  for (const int missed : {2, 3, 4}) {
+    const float late = PeakForce(data.View(), missed);
+    EXPECT_GT(late, 0.7f * in_time) << missed;
+    EXPECT_LT(late, 1.25f * in_time) << missed;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Modes, DeepTools, testing::Values(PhysicsMode::kPaper, PhysicsMode::kAccurate),
                          [](const auto& mode) {
                            return mode.param == PhysicsMode::kPaper ? std::string("paper") : std::string("accurate");
