@@ -15,30 +15,25 @@ constexpr float kMaxFrameShare = 0.98f;
 
 }  // namespace
 
-const Compliance& ComplianceProbe::Update(std::uint32_t tool, std::span<const Index> particles,
-                                          std::span<const Index> around, const Vec3f& direction,
+const Compliance& ComplianceProbe::Update(std::uint32_t tool, std::span<const Index> particles, const Vec3f& direction,
                                           ComplianceSolver* solver) {
   Memory& memory = tools_[tool];
   const std::size_t count = std::min(particles.size(), kMaxParticles);
   if (solver == nullptr || count == 0) {
     return memory.compliance;
   }
-  const bool at_rest = memory.query_rest;
-  ProbeAnswer answer;
-  if (!solver->Stiffness({particles.first(count), around, direction, tool},
-                         at_rest ? ComplianceSolver::kAtRest : frame_s_, &answer)) {
+  float* known = memory.query_rest ? &memory.at_rest : &memory.after_frame;
+  float stiffness = 0;
+  if (!solver->Stiffness({particles.first(count), direction, tool},
+                         memory.query_rest ? ComplianceSolver::kAtRest : frame_s_, &stiffness)) {
     return memory.compliance;
   }
-  memory.query_rest = !at_rest;
-  if (!(answer.newton_per_m > 0.0f) || !std::isfinite(answer.newton_per_m)) {
+  memory.query_rest = !memory.query_rest;
+  if (!(stiffness > 0.0f) || !std::isfinite(stiffness)) {
     return memory.compliance;
   }
-  float& known = at_rest ? memory.at_rest : memory.after_frame;
-  const float share = known > 0.0f ? kShare : 1.0f;
-  known += share * (1.0f / answer.newton_per_m - known);
-  if (at_rest && std::isfinite(answer.follow)) {
-    memory.compliance.follow += share * (std::clamp(answer.follow, 0.0f, 1.0f) - memory.compliance.follow);
-  }
+  const float answer = 1.0f / stiffness;
+  *known += (*known > 0.0f ? kShare : 1.0f) * (answer - *known);
   if (memory.after_frame > 0.0f && memory.at_rest > 0.0f) {
     const float rest = std::clamp(memory.at_rest, kMinCompliance, kMaxCompliance);
     const float part = std::min(memory.after_frame / std::max(memory.at_rest, memory.after_frame), kMaxFrameShare);

@@ -20,14 +20,8 @@ namespace fulcrum::physics {
 /// Particles that are displaced together.
 struct Probe {
   std::span<const Index> particles;
-  std::span<const Index> around;     ///< Their surroundings, which follow them elastically; may be empty.
   Vec3f direction = Vec3f::UnitZ();  ///< Unit, frame W.
   std::uint32_t tool = 0;            ///< Successive queries of a tool are similar: the last answer starts the next.
-};
-
-struct ProbeAnswer {
-  float newton_per_m = 0;  ///< Force over displacement of the particles.
-  float follow = 0;        ///< Mean displacement of `around` in the same direction over that of the particles.
 };
 
 /// Interface of a solver to the probe.
@@ -36,9 +30,9 @@ class ComplianceSolver {
   static constexpr float kAtRest = 0;
 
   virtual ~ComplianceSolver() = default;
-  /// Answers a probe for `horizon_s` after a sudden displacement of its particles or, for kAtRest, at rest.
+  /// Force over displacement of the particles, `horizon_s` after a sudden displacement or, for kAtRest, at rest [N/m].
   /// Does not change the state. False: no answer in this step. The solver bounds the cost; answers may be approximate.
-  virtual bool Stiffness(const Probe& probe, float horizon_s, ProbeAnswer* answer) = 0;
+  virtual bool Stiffness(const Probe& probe, float horizon_s, float* newton_per_m) = 0;
 };
 
 struct Compliance {
@@ -46,7 +40,6 @@ struct Compliance {
   float fast = 0;       ///< Force over displacement after one frame [N/m].
   float stiffness = 0;  ///< At rest [N/m].
   float viscosity = 0;  ///< [N s/m]
-  float follow = 0;     ///< Share of a displacement with which the surroundings follow at rest, 0 ... 1.
 };
 
 class ComplianceProbe {
@@ -56,11 +49,10 @@ class ComplianceProbe {
 
   explicit ComplianceProbe(float frame_s) : frame_s_(frame_s) {}
 
-  /// Once a step for a tool in contact: `particles`, of which at most kMaxParticles are used, are touched or held,
-  /// `around` their surroundings; `direction`: unit direction of the hand's push. Low-passed; known after one answer
-  /// for each horizon.
-  const Compliance& Update(std::uint32_t tool, std::span<const Index> particles, std::span<const Index> around,
-                           const Vec3f& direction, ComplianceSolver* solver);
+  /// Once a step for a tool in contact: `particles`, of which at most kMaxParticles are used, are touched or held;
+  /// `direction`: unit direction of the hand's push. Low-passed; known after one answer for each horizon.
+  const Compliance& Update(std::uint32_t tool, std::span<const Index> particles, const Vec3f& direction,
+                           ComplianceSolver* solver);
   /// At the end of a contact.
   void Reset(std::uint32_t tool) { tools_[tool] = {}; }
   [[nodiscard]] const Compliance& compliance(std::uint32_t tool) const { return tools_[tool].compliance; }

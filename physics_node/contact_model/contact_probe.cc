@@ -73,7 +73,7 @@ ContactProbe::Motion ContactProbe::MeanMotion(std::span<const Index> particles) 
   return mean;
 }
 
-void ContactProbe::FindRing(Index node) {
+ContactProbe::Motion ContactProbe::RingMotion(Index node) const {
   const auto cols = static_cast<int>(model_->cols()), rows = static_cast<int>(model_->rows());
   const int row = static_cast<int>(node) / cols, col = static_cast<int>(node) % cols;
   const auto steps = [&](int direction) {
@@ -81,6 +81,8 @@ void ContactProbe::FindRing(Index node) {
     return length > 0.0f ? std::max(1, static_cast<int>(std::lround(kRingRadius / length))) : 1;
   };
   const int dc = steps(0), dr = steps(1);
+  std::array<Index, 8> ring{};
+  std::size_t count = 0;
   const int diagonal_dr = dr * kDiagonalShare / kDiagonalWhole, diagonal_dc = dc * kDiagonalShare / kDiagonalWhole;
   for (const auto& [r, c] : {std::pair{-dr, 0},
                              {dr, 0},
@@ -93,10 +95,11 @@ void ContactProbe::FindRing(Index node) {
     if (row + r >= 0 && row + r < rows && col + c >= 0 && col + c < cols) {
       const auto at = static_cast<Index>((row + r) * cols + col + c);
       if (model_->NodeAlive(at)) {
-        ring_.push_back(scene_.membrane.first + at);
+        ring[count++] = scene_.membrane.first + at;
       }
     }
   }
+  return MeanMotion({ring.data(), count});
 }
 
 void ContactProbe::Enter(ToolMemory* memory, ContactKind kind) const {
@@ -183,7 +186,7 @@ Contact ContactProbe::MakeContact(std::uint32_t tool) {
   contact.kt = kTangentialOverSkin * contact.k1;
   contact.k_body = memory.stiffness;
   contact.b_body = kRelaxation * memory.stiffness;
-  const Compliance& measured = compliance_.Update(tool, memory.touched, ring_, memory.normal, solver_);
+  const Compliance& measured = compliance_.Update(tool, memory.touched, memory.normal, solver_);
   if (measured.known) {
     contact.k_body = measured.stiffness;
     contact.b_body = measured.viscosity;
@@ -208,7 +211,6 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   ToolMemory& memory = tools_[tool];
   memory.x_ref = pose.p_WT;
   const Vec3f tool_velocity = (pose.p_WT - std::exchange(memory.tip, pose.p_WT)) / scene_.physics.dt_s;
-  ring_.clear();
   DeviceContacts device;
   device.force_cap_N = ContactProbe::kForceCap_N;
   const auto force = [&] {
@@ -272,11 +274,13 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
 
   Motion around;
   if (nearest.found && nearest.on_membrane) {
-    FindRing(model_->TriangleNodes(nearest.triangle)[0]);
-    around = MeanMotion(ring_);
+    around = RingMotion(model_->TriangleNodes(nearest.triangle)[0]);
   }
   if (solver_ != nullptr && touching) {
-    const float follows = compliance_.compliance(tool).follow;
+    // At rest the ring follows a dent with this share; where something else moves both, it is only a bound.
+    const float of_ring = memory.normal.dot(around.displacement),
+                of_dent = memory.normal.dot(MeanMotion(memory.touched).displacement);
+    const float follows = of_dent < -kMinDent ? std::clamp(of_ring / of_dent, 0.0f, 1.0f) : 0.0f;
     around.velocity -= follows * memory.normal.dot(tool_velocity) * memory.normal;
   }
   const float share = scene_.physics.dt_s / (scene_.physics.dt_s + kFilterTime);

@@ -16,7 +16,7 @@
 //           in contact of the shape at rest (the present one has the dent), for the middle of a tip that rolls on it
 //
 // v_s     velocity of the surroundings, the ring of u_c [m/s]. Where k_body is that of the solver, which includes all
-//         that yields, without the part with which the ring follows this tool
+//         that yields, without the share of this tool's velocity with which the ring follows it at rest
 //
 // k_body and b_body come from a ComplianceSolver where the solver has one. Low-pass filters: y += h / (h + T) (x - y)
 // with the step h and the time constant T = kFilterTime [s].
@@ -82,8 +82,7 @@ class ContactProbe {
   void LowPass(ToolMemory* memory, const Vec3f& force, const Vec3f& u) const;
   void MedianFilter(std::uint32_t tool, const ToolForce& force);
   [[nodiscard]] Motion MeanMotion(std::span<const Index> particles) const;
-  /// Sets `ring_` to the nodes around one.
-  void FindRing(Index node);
+  [[nodiscard]] Motion RingMotion(Index node) const;
   [[nodiscard]] Contact MakeContact(std::uint32_t tool);
   /// k1 of a surface, and of skin and body in series [N/m].
   [[nodiscard]] float Skin() const;
@@ -95,7 +94,6 @@ class ContactProbe {
   ElasticForce elastic_;
   SurfaceCurvature curvature_;
   std::array<ToolMemory, kMaxTools> tools_;
-  std::vector<Index> ring_;  ///< Surroundings of the contact of the tool in work.
   ComplianceProbe compliance_;
   ComplianceSolver* solver_ = nullptr;
 };

@@ -24,16 +24,10 @@ namespace fulcrum::physics::implicit {
 /// A query for the stiffness with which the tissue resists a small common displacement of some particles.
 struct StiffnessQuery {
   std::span<const ParticleRef> at;
-  std::span<const ParticleRef> around;  ///< Their surroundings; may be empty.
-  Vec3f direction = Vec3f::UnitZ();     ///< Unit.
-  float horizon_s = 0;                  ///< After so long; 0: when all is at rest again.
+  Vec3f direction = Vec3f::UnitZ();  ///< Unit.
+  float horizon_s = 0;               ///< After so long; 0: when all is at rest again.
   /// Below kQueryCount: the last answer with this number is the first guess of this one.
   std::size_t number = 0;
-};
-
-struct StiffnessAnswer {
-  float newton_per_m = 0;  ///< Force over displacement.
-  float follow = 0;        ///< Mean displacement of `around` along the direction over that of the particles.
 };
 
 /// Substeps and iterations of a preset; errors and costs: deploy/docs/measurements/physics.
@@ -68,10 +62,10 @@ class ImplicitSolver {
   /// Velocities from two states a step apart, for a restart. Wakes.
   void SetVelocity(ParticleRef at, const Vec3f& v);
 
-  /// From the last substep's linearisation, without contacts. Costs two iterations and a
+  /// Force over displacement [N/m], from the last substep's linearisation, without contacts. Costs two iterations and a
   /// product, so the first answer to a new query at rest is too large; it improves when the query is repeated. False:
   /// all is asleep, or the answer is not positive and finite. The state stays as it is.
-  bool Stiffness(const StiffnessQuery& query, StiffnessAnswer* answer);
+  bool Stiffness(const StiffnessQuery& query, float* newton_per_m);
 
   /// Its threads, between substeps. No result depends on them.
   [[nodiscard]] Workers& workers() const { return workers_; }

@@ -82,7 +82,7 @@ void SetFirstGuess(const SolverContext& context, std::span<const ParticleRef> at
 
 }  // namespace
 
-bool ImplicitSolver::Stiffness(const StiffnessQuery& query, StiffnessAnswer* answer) {
+bool ImplicitSolver::Stiffness(const StiffnessQuery& query, float* newton_per_m) {
   const RegionSet& computed = state_.regions.computed();
   if (state_.regions.none_computed() || query.at.empty()) {
     return false;
@@ -129,12 +129,7 @@ bool ImplicitSolver::Stiffness(const StiffnessQuery& query, StiffnessAnswer* ans
   state_.elements.ExcludeContacts(false);
   ReleaseQueried(context_, query.at, &at, &scratch_.queried);
   std::swap(at.residual, scratch_.kept_residual);
-  answer->newton_per_m = pull / kProbeStep_m;
-  answer->follow = 0;
-  for (const ParticleRef particle : query.around) {
-    answer->follow +=
-        FieldAt(u.data(), particle).dot(query.direction) / (kProbeStep_m * static_cast<float>(query.around.size()));
-  }
+  *newton_per_m = pull / kProbeStep_m;
   if (!std::isfinite(pull) || !(pull > 0.0f)) {
     std::fill_n(u.data(), u.size(), 0.0f);
     return false;

@@ -9,8 +9,8 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Path of a pressing tool in a substep of mode accurate [m], kept with up to kMostSubsteps. More substeps change the
-/// force by little, because contacts soften with the path (implicit/elements.cc), and a late step loses more.
+/// Path of a pressing tool in a substep of mode accurate [m], kept with up to kMostSubsteps; beyond, contacts soften
+/// with the path (implicit/elements.cc). Six gain less than steps lose that come late.
 constexpr float kPathPerSubstep = 2e-5f;
 constexpr int kMostSubsteps = 4;
 /// Least substeps while a tool presses: with one per step the error of the force is half of it at any speed of the
@@ -49,27 +49,18 @@ TissueSimulation::TissueSimulation(const TissueScene& scene, int threads, Instru
   }
 }
 
-bool TissueSimulation::ImplicitCompliance::Stiffness(const Probe& probe, float horizon_s, ProbeAnswer* answer) {
+bool TissueSimulation::ImplicitCompliance::Stiffness(const Probe& probe, float horizon_s, float* newton_per_m) {
   // Tools take turns: half, then a quarter of the period apart.
   const std::uint64_t turn = probe.tool % 2 * (kQueryEvery / 2) + probe.tool / 2 * (kQueryEvery / 4);
   if ((simulation_->counters_.steps + turn) % kQueryEvery != 0) {
     return false;
   }
-  const auto refs = [&](std::span<const Index> particles, std::vector<ParticleRef>* at) {
-    at->clear();
-    for (const Index particle : particles) {
-      at->push_back(simulation_->particles_.Ref(particle));
-    }
-  };
-  refs(probe.particles, &at_);
-  refs(probe.around, &around_);
-  const std::size_t number = 2 * probe.tool + (horizon_s > 0.0f ? 1 : 0);
-  implicit::StiffnessAnswer of_solver;
-  if (!simulation_->implicit_->Stiffness({at_, around_, probe.direction, horizon_s, number}, &of_solver)) {
-    return false;
+  at_.clear();
+  for (const Index particle : probe.particles) {
+    at_.push_back(simulation_->particles_.Ref(particle));
   }
-  *answer = {of_solver.newton_per_m, of_solver.follow};
-  return true;
+  const std::size_t number = 2 * probe.tool + (horizon_s > 0.0f ? 1 : 0);
+  return simulation_->implicit_->Stiffness({at_, probe.direction, horizon_s, number}, newton_per_m);
 }
 
 /// Contacts of tissue with tissue and its surroundings, for the step that ends at the present time.
@@ -208,7 +199,8 @@ StepReport TissueSimulation::StepAccurate() {
       const float share = 1.0f / static_cast<float>(i + 1);
       ToolForce& mean = tool_force_[tool];
       mean.force += share * (collision_.force(tool) - mean.force);
-      mean.tip += share * (Interpolate(tracks_[tool].last, tracks_[tool].now, u1).p_WT - mean.tip);
+      const Vec3f &from = tracks_[tool].last.p_WT, &to = tracks_[tool].now.p_WT;
+      mean.tip += share * (from + u1 * (to - from) - mean.tip);
     }
     report.resets += substep.resets;
     largest_speed_ = substep.largest_speed_m_s;

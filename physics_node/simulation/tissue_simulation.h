@@ -115,11 +115,11 @@ class TissueSimulation {
    public:
     static constexpr std::uint64_t kQueryEvery = 8;
     explicit ImplicitCompliance(TissueSimulation* simulation) : simulation_(simulation) {}
-    bool Stiffness(const Probe& probe, float horizon_s, ProbeAnswer* answer) override;
+    bool Stiffness(const Probe& probe, float horizon_s, float* newton_per_m) override;
 
    private:
     TissueSimulation* simulation_;
-    std::vector<ParticleRef> at_, around_;
+    std::vector<ParticleRef> at_;
   };
 
   struct ToolTrack {

@@ -60,12 +60,6 @@ class Accurate : public testing::Test {
     }
     return held;
   }
-  /// Four nodes three edges from the middle of that patch.
-  std::vector<ParticleRef> AroundPatch(const Run& run) const {
-    const Index row = scene_.membrane.rows / 2, col = scene_.membrane.cols / 2;
-    return {run.particles.NodeRef(row - 3, col), run.particles.NodeRef(row + 3, col),
-            run.particles.NodeRef(row, col - 3), run.particles.NodeRef(row, col + 3)};
-  }
   TopologyState WholeTopology() const {
     TopologyState topology;
     const std::size_t nodes = scene_.membrane.node_count();
@@ -255,24 +249,14 @@ TEST_F(Accurate, AnswersQuestionsAsItThenBehaves) {
   }
   const Vec3f before = force();
   const std::vector<float> places = run.Positions();
-  const std::vector<ParticleRef> around = AroundPatch(run);
-  const auto mean_height = [&] {
-    float sum = 0;
-    for (const ParticleRef particle : around) sum += run.particles.At(particle).z();
-    return sum / static_cast<float>(around.size());
-  };
-  const float height_before = mean_height();
-  const auto ask = [&](float horizon_s, std::size_t memory, int questions) {
-    implicit::StiffnessAnswer answer;
+  const auto stiffness = [&](float horizon_s, std::size_t memory, int questions) {
+    float answer = 0;
     for (int i = 0; i < questions; ++i) {
-      EXPECT_TRUE(run.solver.Stiffness({at, around, Vec3f::UnitZ(), horizon_s, memory}, &answer));
+      EXPECT_TRUE(run.solver.Stiffness({at, Vec3f::UnitZ(), horizon_s, memory}, &answer));
     }
     return answer;
   };
-  const auto stiffness = [&](float horizon_s, std::size_t memory, int questions) {
-    return ask(horizon_s, memory, questions).newton_per_m;
-  };
-  const float at_rest = stiffness(0, 0, 10), in_a_frame = stiffness(0.01f, 1, 3), follow = ask(0, 0, 1).follow;
+  const float at_rest = stiffness(0, 0, 10), in_a_frame = stiffness(0.01f, 1, 3);
   EXPECT_EQ(run.Positions(), places);
   EXPECT_EQ(force(), before) << "The query does not change the state.";
   EXPECT_GT(in_a_frame, at_rest);
@@ -281,9 +265,6 @@ TEST_F(Accurate, AnswersQuestionsAsItThenBehaves) {
   }
   const float measured = (before - force()).z() / kStep;
   EXPECT_NEAR(at_rest, measured, 0.05f * measured);
-  const float followed = (mean_height() - height_before) / kStep;
-  EXPECT_GT(followed, 0.1f);
-  EXPECT_NEAR(follow, followed, 0.05f);
 
   // The same patch, released before.
   Release(&run);

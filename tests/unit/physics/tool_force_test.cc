@@ -71,5 +71,28 @@ TEST_F(ToolForce, IsCalmAlongTheSurface) {
   EXPECT_LT(Roughness(Vec3f(0, 0.004f, 0), 0.003f, 0), kCalm);
 }
 
+/// The stiffness of the solver contains what yields around the tool; as motion of the surroundings it would count
+/// twice.
+TEST_F(ToolForce, ItsOwnPressIsNoMotionOfTheSurroundings) {
+  TissueSimulation simulation(scene_);
+  const Vec3f place = scene_.rest_position[scene_.membrane.first + 144 * scene_.membrane.cols + 25];
+  constexpr float kSpeed_m_s = 0.02f;
+  std::array<ToolInput, kMaxTools> tools;
+  double moved = 0;
+  int pressed = 0;
+  for (int i = 0; i < 45; ++i) {
+    const float height = 0.003f - kSpeed_m_s * scene_.physics.dt_s * static_cast<float>(i);
+    tools[0] = {true, PoseAtTip(scene_.tools[0], place + Vec3f(0, 0, height), 0.35f)};
+    simulation.Step(tools);
+    const DeviceContacts device = simulation.Contacts(0);
+    if (i >= 35 && device.count > 0) {
+      moved += static_cast<double>(device.contacts[0].v_s.dot(device.contacts[0].n) / kSpeed_m_s);
+      ++pressed;
+    }
+  }
+  ASSERT_EQ(pressed, 10);
+  EXPECT_NEAR(moved / pressed, 0.0, 0.15);
+}
+
 }  // namespace
 }  // namespace fulcrum::physics
