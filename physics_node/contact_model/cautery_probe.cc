@@ -180,7 +180,7 @@ void CauteryProbe::SignHeights() {
   }
 }
 
-bool CauteryProbe::FindCentre(float radius_m, Vec2f* centre) {
+bool CauteryProbe::FindCentre(float radius_m, float step_s, Vec2f* centre) {
   // In contact the middle of the sheet is further from the axis by half its thickness.
   const float touch = radius_m + 0.5f * scene_.thermal.thickness_m;
   const float limit = touch + (was_touching_ ? kHoldGap : kStrikeGap);
@@ -205,7 +205,7 @@ bool CauteryProbe::FindCentre(float radius_m, Vec2f* centre) {
   if (!(sum > 0.0f)) {
     return false;
   }
-  const float share = 1.0f - std::exp(-scene_.physics.dt_s / kCentreTime);
+  const float share = 1.0f - std::exp(-step_s / kCentreTime);
   centre_ = was_touching_ ? centre_ + share * (mean / sum - centre_) : mean / sum;
   const auto i = std::min(static_cast<std::size_t>(centre_), stations_.size() - 2);
   const float u = centre_ - static_cast<float>(i);
@@ -331,7 +331,8 @@ void CauteryProbe::FillFootprint(const ToolPose& pose, const ToolDescription& to
   }
 }
 
-CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision) {
+CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision,
+                                    float step_s) {
   CauteryContact contact;
   contact.tool = static_cast<std::uint8_t>(tool);
   const ToolDescription& description = scene_.tools[tool];
@@ -343,7 +344,7 @@ CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   if (followed_) {
     SignHeights();
   }
-  if (!followed_ || !FindCentre(description.tip_radius_m, &centre)) {
+  if (!followed_ || !FindCentre(description.tip_radius_m, step_s, &centre)) {
     was_touching_ = false;
     rate_.setZero();
     return contact;
@@ -360,8 +361,7 @@ CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   contact.tented = Tented(place.triangle, place.barycentric);
   contact.contact_radius_m = description.tip_radius_m;
   if (was_touching_) {
-    const float dt = scene_.physics.dt_s;
-    rate_ += dt / (dt + kRateTime) * ((contact.material - last_material_) / dt - rate_);
+    rate_ += step_s / (step_s + kRateTime) * ((contact.material - last_material_) / step_s - rate_);
   }
   contact.material_rate = rate_;
   was_touching_ = true;

@@ -22,7 +22,8 @@ class CauteryProbe {
   /// sheet near it; each side of a slit continues unstretched up to its lip. Stations along the axis of the metal
   /// follow the nearest place of the sheet from step to step, also across slits, so the centre of the contact is
   /// continuous for a continuous motion of the tool. Their distances determine touch, with hysteresis.
-  [[nodiscard]] CauteryContact Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision);
+  [[nodiscard]] CauteryContact Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision,
+                                      float step_s);
 
  private:
   /// Access of SlitSheet to the membrane (services/base/core/slit_sheet.h).
@@ -55,7 +56,7 @@ class CauteryProbe {
   void SignHeights();
   /// Mean place of the metal within the gap that conducts, weighted by (limit - distance)^2 and by the
   /// length that it covers. False: there is none.
-  bool FindCentre(float radius_m, Vec2f* centre);
+  bool FindCentre(float radius_m, float step_s, Vec2f* centre);
   /// End of the foot, heel, end of the bare neck, in frame W.
   using MetalAxis = std::array<Vec3f, 3>;
   /// Gaps of the cells around `centre` from the metal.

@@ -58,7 +58,10 @@ ContactProbe::ContactProbe(const TissueScene& scene, const TissueModel* model, c
       particles_(particles),
       elastic_(scene, model, particles),
       curvature_(scene, model, particles),
-      compliance_(scene.physics.dt_s) {}
+      compliance_(scene.physics.dt_s),
+      step_s_(scene.physics.dt_s) {}
+
+float ContactProbe::FilterShare() const { return step_s_ / (step_s_ + kFilterTime); }
 
 ContactProbe::Motion ContactProbe::MeanMotion(std::span<const Index> particles) const {
   Motion mean;
@@ -69,7 +72,7 @@ ContactProbe::Motion ContactProbe::MeanMotion(std::span<const Index> particles) 
   }
   const float scale = particles.empty() ? 0.0f : 1.0f / static_cast<float>(particles.size());
   mean.displacement *= scale;
-  mean.velocity *= scale / scene_.physics.dt_s;
+  mean.velocity *= scale / step_s_;
   return mean;
 }
 
@@ -119,11 +122,11 @@ void ContactProbe::Enter(ToolMemory* memory, ContactKind kind) const {
 }
 
 void ContactProbe::LowPass(ToolMemory* memory, const Vec3f& force, const Vec3f& u) const {
-  const float dt = scene_.physics.dt_s, share = dt / (dt + kFilterTime);
+  const float share = FilterShare();
   memory->force += share * (Limited(force, ContactProbe::kForceCap_N) - memory->force);
   const Vec3f before = memory->u;
   memory->u += share * (Limited(u, kMaxDisplacement) - memory->u);
-  memory->du += share * (Limited((memory->u - before) / dt, kMaxRate) - memory->du);
+  memory->du += share * (Limited((memory->u - before) / step_s_, kMaxRate) - memory->du);
   const float dent = memory->u.norm();
   if (dent > kMinDent && memory->force.norm() > 0.0f) {
     const float secant = std::clamp(kBodyOverSecant * memory->force.norm() / dent, kMinBody, kMaxBody);
@@ -207,10 +210,11 @@ void ContactProbe::Reset(std::uint32_t tool, const ToolPose& pose) {
 }
 
 DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision,
-                                    const Grasp& grasp, const ToolForce* solver_force) {
+                                    const Grasp& grasp, float step_s, const ToolForce* solver_force) {
+  step_s_ = step_s;
   ToolMemory& memory = tools_[tool];
   memory.x_ref = pose.p_WT;
-  const Vec3f tool_velocity = (pose.p_WT - std::exchange(memory.tip, pose.p_WT)) / scene_.physics.dt_s;
+  const Vec3f tool_velocity = (pose.p_WT - std::exchange(memory.tip, pose.p_WT)) / step_s;
   DeviceContacts device;
   device.force_cap_N = ContactProbe::kForceCap_N;
   const auto force = [&] {
@@ -265,9 +269,9 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
     normal = nearest.closest.on_segment - nearest.closest.on_triangle;
   }
   if (normal.norm() > 0.0f) {
-    const float share = scene_.physics.dt_s / (scene_.physics.dt_s + kFilterTime);
-    memory.normal = memory.normal.isZero() ? normal.normalized()
-                                           : Vec3f(memory.normal + share * (normal.normalized() - memory.normal));
+    memory.normal = memory.normal.isZero()
+                        ? normal.normalized()
+                        : Vec3f(memory.normal + FilterShare() * (normal.normalized() - memory.normal));
   }
   // The average of opposite normals can vanish; any unit vector will do for that step.
   memory.normal = memory.normal.norm() > kMinNormal ? memory.normal.normalized() : Vec3f::UnitZ();
@@ -283,8 +287,7 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
     const float follows = of_dent < -kMinDent ? std::clamp(of_ring / of_dent, 0.0f, 1.0f) : 0.0f;
     around.velocity -= follows * memory.normal.dot(tool_velocity) * memory.normal;
   }
-  const float share = scene_.physics.dt_s / (scene_.physics.dt_s + kFilterTime);
-  memory.v_s += share * (Limited(around.velocity, kMaxSurroundings) - memory.v_s);
+  memory.v_s += FilterShare() * (Limited(around.velocity, kMaxSurroundings) - memory.v_s);
   LowPass(&memory, force(),
           touching ? Vec3f(MeanMotion(memory.touched).displacement - around.displacement) : Vec3f(Vec3f::Zero()));
 

@@ -3,8 +3,8 @@
 //
 //   f_ref   force of the tissue on the tool [N]. With the force of the solver: of a grasp unfiltered; of a surface the
 //           median of the last kMedian steps, older ones changed by the stiffness for the way of the tip since then,
-//           with x_ref the mean place of the tip in the last step, as f_ref is a mean. Else the elastic force of the
-//           edges of the touched or held particles (elastic_force.h), low-passed over kFilterTime
+//           with x_ref the mean place of the tip meanwhile, as f_ref is a mean over the last period of a step. Else the
+//           elastic force of the edges of the touched or held particles (elastic_force.h), low-passed over kFilterTime
 //   u_c     displacement of the tissue at the contact relative to its surroundings, a ring at kRingRadius [m]: a tent
 //           raised by the other tool is no dent of this one
 //   k1, kt  skin [N/m]: a small disc of the membrane resists with E t independent of its size
@@ -46,10 +46,10 @@ class ContactProbe {
 
   ContactProbe(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles);
 
-  /// Contacts of one tool after a step: a grasp, or the nearest surface within range, or none. `solver_force`: from
-  /// the solver, over the last step; null: estimated from the edges.
+  /// Contacts of one tool after a step of `step_s`: a grasp, or the nearest surface within range, or none.
+  /// `solver_force`: from the solver, over that step; null: estimated from the edges.
   DeviceContacts Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision, const Grasp& grasp,
-                        const ToolForce* solver_force);
+                        float step_s, const ToolForce* solver_force);
   /// Before an Update that does not directly follow the last one: discards the history of the filters.
   void Reset(std::uint32_t tool, const ToolPose& pose);
   /// Source of stiffness and viscosity; nullptr: estimated from force and dent.
@@ -87,6 +87,8 @@ class ContactProbe {
   /// k1 of a surface, and of skin and body in series [N/m].
   [[nodiscard]] float Skin() const;
   [[nodiscard]] float InSeries(std::uint32_t tool) const;
+  /// Weight of a new value in the low-pass filters.
+  [[nodiscard]] float FilterShare() const;
 
   TissueScene scene_;
   const TissueModel* model_;
@@ -96,6 +98,7 @@ class ContactProbe {
   std::array<ToolMemory, kMaxTools> tools_;
   ComplianceProbe compliance_;
   ComplianceSolver* solver_ = nullptr;
+  float step_s_;  ///< Length of the last step.
 };
 
 }  // namespace fulcrum::physics

@@ -98,16 +98,15 @@ void Grasp::DropIf(const TissueModel& model, ParticleStore* particles, const Pre
   }
 }
 
-void Grasp::Slip(const Vec3f& traction_W, const ToolDescription& tool, const ToolPose& pose, const TissueModel& model,
-                 ParticleStore* particles) {
-  const float dt = scene_.physics.dt_s;
-  traction_ += dt / (dt + kTractionTime) * (traction_W - traction_);
+void Grasp::Slip(const Vec3f& traction_W, float step_s, const ToolDescription& tool, const ToolPose& pose,
+                 const TissueModel& model, ParticleStore* particles) {
+  traction_ += step_s / (step_s + kTractionTime) * (traction_W - traction_);
   const float traction = traction_.norm(), grip = GripForce(scene_.physics, pose.jaw_rad);
   if (!holding() || !(traction > grip)) {
     return;
   }
   const float excess = grip > 0.0f ? std::min(traction / grip - 1.0f, kMaxExcess) : kMaxExcess;
-  const Vec3f creep_T = (kCreepSpeed * dt * excess / traction) * (pose.q_WT.conjugate() * traction_);
+  const Vec3f creep_T = (kCreepSpeed * step_s * excess / traction) * (pose.q_WT.conjugate() * traction_);
   for (HeldParticle& held : held_) {
     held.p_T += creep_T / HoldOf(held, tool);
   }

@@ -42,8 +42,8 @@ class Grasp {
   /// Once a step: above GripForce the tissue creeps out of the jaws along the traction, the force of the tissue on the
   /// tool [N, frame W]. The solver reports it as the sum of the forces on the held particles; otherwise it is estimated
   /// from the edges. Particles that leave the jaws are released.
-  void Slip(const Vec3f& traction_W, const ToolDescription& tool, const ToolPose& pose, const TissueModel& model,
-            ParticleStore* particles);
+  void Slip(const Vec3f& traction_W, float step_s, const ToolDescription& tool, const ToolPose& pose,
+            const TissueModel& model, ParticleStore* particles);
   /// Releases particles that have been cut off.
   void DropDead(const TissueModel& model, ParticleStore* particles);
   void Release(const TissueModel& model, ParticleStore* particles);

@@ -21,12 +21,12 @@ struct HeldRecord {
   float p_T[3];
 };
 struct Header {
-  std::uint64_t steps;
+  std::uint64_t periods;
   std::uint32_t particle_count;
   float max_displacement_m;
   double contact_time_s;
-  std::uint32_t torn_bytes;  ///< 0: nothing has torn.
-  std::uint32_t unused;
+  std::uint32_t torn_bytes;       ///< 0: nothing has torn.
+  std::uint32_t further_periods;  ///< Of the last step, beyond one.
   ToolRecord tools[kMaxTools];
 };
 // Followed by positions, previous positions (3 floats a particle each), then the held particles tool by tool,
@@ -35,8 +35,8 @@ struct Header {
 // Bounds of plausible values, beyond those of any session.
 constexpr float kMostCoordinate_m = 10;
 constexpr float kMostJaw_rad = 3;
-constexpr float kUnitTolerance = 1e-3f;              ///< Of the squared norm of a quaternion, far above rounding.
-constexpr std::uint64_t kMostSteps = 1'000'000'000;  ///< About four months at 100 Hz.
+constexpr float kUnitTolerance = 1e-3f;                ///< Of the squared norm of a quaternion, far above rounding.
+constexpr std::uint64_t kMostPeriods = 1'000'000'000;  ///< About four months at 100 Hz.
 
 bool IsPlausible(const ToolRecord& tool) {
   const auto within = [](float value, float limit) { return std::abs(value) <= limit; };  // false for NaN
@@ -63,7 +63,8 @@ std::size_t WriteCheckpoint(const TissueSimulation& simulation, const NodeMemory
   const Index count = particles.particle_count();
   const SimulationMemory memory = simulation.Save();
   Header header{};
-  header.steps = memory.steps;
+  header.periods = memory.periods;
+  header.further_periods = memory.last_periods - 1;
   header.particle_count = count;
   header.max_displacement_m = node.max_displacement_m;
   header.contact_time_s = node.contact_time_s;
@@ -94,12 +95,12 @@ std::size_t WriteCheckpoint(const TissueSimulation& simulation, const NodeMemory
   return static_cast<std::size_t>(at - slot.data());
 }
 
-std::uint64_t CheckpointSteps(std::span<const std::byte> payload) {
+std::uint64_t CheckpointPeriods(std::span<const std::byte> payload) {
   Header header{};
   if (payload.size() >= sizeof(header)) {
     std::memcpy(&header, payload.data(), sizeof(header));
   }
-  return header.steps;
+  return header.periods;
 }
 
 std::optional<NodeMemory> ReadCheckpoint(std::span<const std::byte> payload, TissueSimulation* simulation) {
@@ -115,7 +116,7 @@ std::optional<NodeMemory> ReadCheckpoint(std::span<const std::byte> payload, Tis
   }
   size += header.torn_bytes;
   if (payload.size() != size || header.particle_count != simulation->particles().particle_count() ||
-      header.unused != 0 || header.steps > kMostSteps ||
+      header.further_periods >= TissueSimulation::kMostStepPeriods || header.periods > kMostPeriods ||
       !(header.max_displacement_m >= 0 && header.max_displacement_m <= kMostCoordinate_m) ||
       !std::isfinite(header.contact_time_s)) {
     return std::nullopt;
@@ -125,7 +126,8 @@ std::optional<NodeMemory> ReadCheckpoint(std::span<const std::byte> payload, Tis
   std::memcpy(previous.data(), payload.data() + sizeof(Header) + floats * sizeof(float), floats * sizeof(float));
   const std::byte* at = payload.data() + sizeof(Header) + 2 * floats * sizeof(float);
   SimulationMemory memory;
-  memory.steps = header.steps;
+  memory.periods = header.periods;
+  memory.last_periods = header.further_periods + 1;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     const ToolRecord& tool = header.tools[i];
     if (!IsPlausible(tool)) {

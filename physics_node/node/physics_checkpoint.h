@@ -26,8 +26,8 @@ struct NodeMemory {
 /// Fills `slot`, at least CheckpointCapacity() long; returns the bytes used.
 std::size_t WriteCheckpoint(const TissueSimulation& simulation, const NodeMemory& memory, std::span<std::byte> slot);
 
-/// Number of steps at the time of writing; 0 if the bytes are no checkpoint.
-[[nodiscard]] std::uint64_t CheckpointSteps(std::span<const std::byte> payload);
+/// Periods simulated at the time of writing; 0 if the bytes are no checkpoint.
+[[nodiscard]] std::uint64_t CheckpointPeriods(std::span<const std::byte> payload);
 
 /// Restores the simulation. No value, with the simulation unchanged, if the bytes do not fit.
 std::optional<NodeMemory> ReadCheckpoint(std::span<const std::byte> payload, TissueSimulation* simulation);

@@ -85,7 +85,7 @@ bool PhysicsNode::TakeOver(std::span<const std::byte> other, const Tick& tick) {
   stampers_ = Stampers(tick.stamp_ns);
   ticks_.first_index = tick.index;
   const auto own = checkpoint_ == nullptr ? std::nullopt : checkpoint_->Latest();
-  const bool own_is_newer = own && CheckpointSteps(own->payload) > CheckpointSteps(other);
+  const bool own_is_newer = own && CheckpointPeriods(own->payload) > CheckpointPeriods(other);
   restart_.restored = Restore(own_is_newer ? own->payload : other);
   return restart_.restored;
 }
@@ -212,7 +212,7 @@ void PhysicsNode::AdaptPreset(const Tick& tick) {
 void PhysicsNode::Step(const Tick& tick) {
   AdaptPreset(tick);
   TakeInputs(tick);
-  const StepReport report = simulation_.Step(inputs_);
+  const StepReport report = simulation_.Step(inputs_, ticks_.count == 0 ? 1 : ticks_.periods);
   figures_.asleep_ticks.fetch_add(report.asleep ? 1 : 0, std::memory_order_relaxed);
   PublishContacts(tick);
   PublishCautery(tick);

@@ -19,8 +19,9 @@ constexpr int kLeastSubsteps = 2;
 /// Iterations where tools require more substeps than the preset: these are shorter, and two iterations suffice.
 constexpr int kIterationsOfShort = 2;
 
-/// Bounds of a state that a step can have left [m]: coordinates, and the movement in a step, which never exceeds 60 mm.
-constexpr float kMostCoordinate_m = 10.0f, kMostTravel_m = 0.1f;
+/// Bounds of a state that a step can have left [m]: coordinates, and the movement in a step, which never exceeds 160
+/// mm.
+constexpr float kMostCoordinate_m = 10.0f, kMostTravel_m = 0.2f;
 
 }  // namespace
 
@@ -81,7 +82,7 @@ StepReport TissueSimulation::StepPaper() {
   const FinishResult finish = solver_.Finish();
   collision_.Settle();
   for (std::size_t i = 0; i < kMaxTools; ++i) {
-    grasps_[i].Slip(contacts_.force(static_cast<std::uint32_t>(i)), scene_.tools[i], tracks_[i].now, model_,
+    grasps_[i].Slip(contacts_.force(static_cast<std::uint32_t>(i)), step_s(), scene_.tools[i], tracks_[i].now, model_,
                     &particles_);
   }
   report.resets += finish.resets;
@@ -124,9 +125,9 @@ void TissueSimulation::FindAllContacts(float h) {
 StepReport TissueSimulation::StepXpbd() {
   StepReport report;
   const auto substeps = static_cast<float>(scene_.physics.substeps);
-  const float h = scene_.physics.dt_s / substeps;
+  const float h = step_s() / substeps;
   // Previous positions are those of the last substep, so the movement in a step is bounded by the largest speed.
-  moved_.assign(particles_.block_count(), largest_speed_ * scene_.physics.dt_s);
+  moved_.assign(particles_.block_count(), largest_speed_ * step_s());
   FindAllContacts(h);
   float largest_sq = 0;
   for (std::uint32_t i = 0; i < scene_.physics.substeps; ++i) {
@@ -146,9 +147,9 @@ StepReport TissueSimulation::StepXpbd() {
     largest_sq = std::max(largest_sq, finish.max_step_sq);
   }
   largest_speed_ = std::sqrt(largest_sq) / h;
-  report.max_step_m = largest_speed_ * scene_.physics.dt_s;
+  report.max_step_m = largest_speed_ * step_s();
   for (std::size_t i = 0; i < kMaxTools; ++i) {
-    grasps_[i].Slip(contacts_.force(static_cast<std::uint32_t>(i)), scene_.tools[i], tracks_[i].now, model_,
+    grasps_[i].Slip(contacts_.force(static_cast<std::uint32_t>(i)), step_s(), scene_.tools[i], tracks_[i].now, model_,
                     &particles_);
   }
   return report;
@@ -176,7 +177,9 @@ StepReport TissueSimulation::StepAccurate() {
   const int iterations =
       count > effort_.substeps ? std::min(effort_.iterations, kIterationsOfShort) : effort_.iterations;
   const auto substeps = static_cast<float>(count);
-  const float h = scene_.physics.dt_s / substeps;
+  const float h = step_s() / substeps;
+  // A force is the mean over the last period of the step: in older substeps a moving tool was too far from its place.
+  const int older = count - (count + static_cast<int>(step_periods_) - 1) / static_cast<int>(step_periods_);
   report.resets = implicit_->BeginStep();
   const std::span<const float> moved = implicit_->moved();
   moved_.assign(moved.begin(), moved.end());
@@ -196,7 +199,7 @@ StepReport TissueSimulation::StepAccurate() {
     const implicit::SubstepReport substep = implicit_->Substep(h, iterations, held_places_, rows_);
     collision_.TakeForces(rows_);
     for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
-      const float share = 1.0f / static_cast<float>(i + 1);
+      const float share = 1.0f / static_cast<float>(i < older ? i + 1 : i + 1 - older);
       ToolForce& mean = tool_force_[tool];
       mean.force += share * (collision_.force(tool) - mean.force);
       const Vec3f &from = tracks_[tool].last.p_WT, &to = tracks_[tool].now.p_WT;
@@ -204,7 +207,7 @@ StepReport TissueSimulation::StepAccurate() {
     }
     report.resets += substep.resets;
     largest_speed_ = substep.largest_speed_m_s;
-    report.max_step_m = std::max(report.max_step_m, largest_speed_ * scene_.physics.dt_s);
+    report.max_step_m = std::max(report.max_step_m, largest_speed_ * step_s());
   }
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     Vec3f traction = Vec3f::Zero();
@@ -214,12 +217,15 @@ StepReport TissueSimulation::StepAccurate() {
     if (grasps_[i].holding()) {
       tool_force_[i] = {traction, tracks_[i].now.p_WT};
     }
-    grasps_[i].Slip(traction, scene_.tools[i], tracks_[i].now, model_, &particles_);
+    grasps_[i].Slip(traction, step_s(), scene_.tools[i], tracks_[i].now, model_, &particles_);
   }
   return report;
 }
 
-StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools) {
+StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools, std::uint64_t periods) {
+  const std::uint64_t most = scene_.physics.mode == PhysicsMode::kPaper ? 1 : kMostStepPeriods;
+  step_periods_ = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(periods, 1, most));
+  counters_.periods += step_periods_;
   ++counters_.steps;
   FollowTools(tools);
   const bool held = grasps_[0].holding() || grasps_[1].holding();
@@ -300,11 +306,12 @@ DeviceContacts TissueSimulation::Contacts(std::uint32_t tool) {
   if (std::exchange(contacts_step_[tool], counters_.steps) + 1 < counters_.steps) {
     contacts_.Reset(tool, tracks_[tool].now);
   }
-  return contacts_.Update(tool, tracks_[tool].now, collision_, grasps_[tool], implicit_ ? &tool_force_[tool] : nullptr);
+  return contacts_.Update(tool, tracks_[tool].now, collision_, grasps_[tool], step_s(),
+                          implicit_ ? &tool_force_[tool] : nullptr);
 }
 
 CauteryContact TissueSimulation::Cautery(std::uint32_t tool) {
-  return cautery_.Update(tool, tracks_[tool].now, collision_);
+  return cautery_.Update(tool, tracks_[tool].now, collision_, step_s());
 }
 
 /// body(part, worker) for each of ParticleStore::kParts, on the threads of the solver if it has any.
@@ -370,7 +377,8 @@ std::uint64_t TissueSimulation::StateHash() const {
 
 SimulationMemory TissueSimulation::Save() const {
   SimulationMemory memory;
-  memory.steps = counters_.steps;
+  memory.periods = counters_.periods;
+  memory.last_periods = step_periods_;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     memory.pose[i] = tracks_[i].now;
     memory.known[i] = tracks_[i].present;
@@ -407,11 +415,12 @@ bool TissueSimulation::Restore(std::span<const float> xyz, std::span<const float
       return false;
     }
   }
+  step_periods_ = std::clamp(memory.last_periods, 1u, kMostStepPeriods);
   particles_.SetAll(xyz, previous_xyz);
   if (implicit_) {
     for (Index p = 0; p < particles_.particle_count(); ++p) {
       const ParticleRef at = particles_.Ref(p);
-      implicit_->SetVelocity(at, (particles_.At(at) - particles_.Previous(at)) / scene_.physics.dt_s);
+      implicit_->SetVelocity(at, (particles_.At(at) - particles_.Previous(at)) / step_s());
     }
   }
   for (std::size_t i = 0; i < kMaxTools; ++i) {
@@ -419,7 +428,7 @@ bool TissueSimulation::Restore(std::span<const float> xyz, std::span<const float
     grasps_[i].Restore(memory.grasp_state[i], memory.held[i], &particles_);
   }
   tears_.Restore(memory.torn_edges);
-  counters_.steps = memory.steps;
+  counters_.steps = counters_.periods = memory.periods;
   sleep_.asleep = false;
   sleep_.still_steps = 0;
   ++counters_.state_version;

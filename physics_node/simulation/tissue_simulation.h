@@ -33,7 +33,8 @@ struct StepReport {
 
 /// State for a restarted node, without positions.
 struct SimulationMemory {
-  std::uint64_t steps = 0;  ///< Steps since the start.
+  std::uint64_t periods = 0;       ///< Simulated since the start.
+  std::uint32_t last_periods = 1;  ///< Of the last step.
   std::array<ToolPose, kMaxTools> pose;
   std::array<bool, kMaxTools> known{};
   std::array<Grasp::State, kMaxTools> grasp_state{};
@@ -46,6 +47,8 @@ class TissueSimulation {
   /// Largest speed of a tool behind its input [m/s], [rad/s]: after a gap in the input it must not jump through tissue.
   static constexpr float kMaxToolSpeed = 1.0f;
   static constexpr float kMaxToolTurn = 6.0f;
+  /// Longest step: after more skipped periods simulated time falls behind session time.
+  static constexpr std::uint32_t kMostStepPeriods = 3;
 
   /// `threads` for a step of mode accurate; the state does not depend on their number.
   explicit TissueSimulation(const TissueScene& scene, int threads = 1, InstructionSet set = BestInstructionSet());
@@ -53,8 +56,9 @@ class TissueSimulation {
   TissueSimulation(const TissueSimulation&) = delete;
   TissueSimulation& operator=(const TissueSimulation&) = delete;
 
-  /// Advances by PhysicsParams.dt_s. A tool that is not present exerts no force and releases its grasp.
-  StepReport Step(const std::array<ToolInput, kMaxTools>& tools);
+  /// Advances by `periods` of PhysicsParams.dt_s in one step, at most by kMostStepPeriods; in mode paper always by one.
+  /// A tool that is not present exerts no force and releases its grasp.
+  StepReport Step(const std::array<ToolInput, kMaxTools>& tools, std::uint64_t periods = 1);
   /// Removed cells around the hook. False: they belong to another scene and are refused.
   bool SetOpenCells(const OpenCells& cells);
   /// Cut and shrunk edges; see TissueModel::Apply. A change wakes the tissue.
@@ -88,10 +92,12 @@ class TissueSimulation {
   /// Share of the tissue that is awake.
   [[nodiscard]] float awake_part() const;
   [[nodiscard]] std::uint64_t quarantined() const { return counters_.quarantined; }
-  /// Number of steps times their length [s]: the time of breathing.
+  /// Sum of the lengths of all steps [s]: the time of breathing.
   [[nodiscard]] double simulated_time_s() const {
-    return static_cast<double>(counters_.steps) * static_cast<double>(scene_.physics.dt_s);
+    return static_cast<double>(counters_.periods) * static_cast<double>(scene_.physics.dt_s);
   }
+  /// Length of the last step [s].
+  [[nodiscard]] float step_s() const { return static_cast<float>(step_periods_) * scene_.physics.dt_s; }
   /// Counter that changes whenever positions may have changed.
   [[nodiscard]] std::uint64_t state_version() const { return counters_.state_version; }
 
@@ -142,7 +148,7 @@ class TissueSimulation {
   void FindAllContacts(float h);
   void UpdateGrasps();
   void WatchTears(float max_step_m);
-  [[nodiscard]] double step_begin_s() const { return simulated_time_s() - static_cast<double>(scene_.physics.dt_s); }
+  [[nodiscard]] double step_begin_s() const { return simulated_time_s() - static_cast<double>(step_s()); }
   void FindTissueContacts();
   void FindContacts(bool tissue_moved, float tissue_step = 0);
 
@@ -156,7 +162,7 @@ class TissueSimulation {
   std::vector<implicit::HeldPlace> held_places_;
   std::vector<ContactRow> rows_;
   std::vector<float> moved_;                     ///< By block of particles: movement in the last step [m].
-  std::array<ToolForce, kMaxTools> tool_force_;  ///< Means over the substeps of the last step, in mode accurate.
+  std::array<ToolForce, kMaxTools> tool_force_;  ///< Means over the last period of a step, in mode accurate.
   float largest_speed_ = 0;                      ///< Of the tissue in the last step; not in mode paper [m/s].
   ToolCollision collision_;
   TissueCollision tissue_collision_;
@@ -173,9 +179,10 @@ class TissueSimulation {
   Sleep sleep_;
   std::array<std::uint64_t, kMaxTools> contacts_step_{};  ///< Step of the last Contacts of a tool.
   struct Counters {
-    std::uint64_t steps = 0, quarantined = 0, state_version = 1;
+    std::uint64_t steps = 0, periods = 0, quarantined = 0, state_version = 1;
   };
   Counters counters_;
+  std::uint32_t step_periods_ = 1;  ///< Length of the last step.
 };
 
 }  // namespace fulcrum::physics

@@ -37,7 +37,6 @@ bool TissueSimulation::ToolTrack::moved() const {
 }
 
 void TissueSimulation::FollowTools(const std::array<ToolInput, kMaxTools>& tools) {
-  const float dt = scene_.physics.dt_s;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     ToolTrack& track = tracks_[i];
     const bool appears = tools[i].present && !track.present;
@@ -46,7 +45,7 @@ void TissueSimulation::FollowTools(const std::array<ToolInput, kMaxTools>& tools
       continue;
     }
     track.last = appears ? tools[i].pose : track.now;
-    track.now = Approach(track.last, tools[i].pose, kMaxToolSpeed * dt, kMaxToolTurn * dt);
+    track.now = Approach(track.last, tools[i].pose, kMaxToolSpeed * step_s(), kMaxToolTurn * step_s());
   }
 }
 

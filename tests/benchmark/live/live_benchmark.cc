@@ -1,6 +1,6 @@
 // Force at the hand with the real physics_node over DDS (haptics.live*), and with servo and physics in this process
-// and simulated time, where no step runs late (haptics.in_time*); both against the same physics run at 1 kHz with the
-// tool poses that the servo published.
+// and simulated time, where no step runs late (haptics.in_time*) or each second one does, so that each third period is
+// missed (haptics.late*); all against the same physics run at 1 kHz with the tool poses that the servo published.
 #include <unistd.h>
 
 #include <algorithm>
@@ -164,16 +164,20 @@ physics::ToolInput InputOf(const SceneView& scene, const Sample& sample, double 
 }
 
 /// The same session without processes and clock: a step of physics begins kWake_ms after its session time, and its
-/// contact model arrives kModel_ms after that time. Tool 0 alone.
-std::vector<Sample> Simulate(const SceneView& scene) {
-  constexpr int kWake_ms = 1, kModel_ms = 7;
+/// contact model arrives kStep_ms later. Tool 0 alone.
+/// @param late each second step takes kLateStep_ms; the next period is missed, as in physics_node with a cheaper
+/// preset.
+std::vector<Sample> Simulate(const SceneView& scene, bool late) {
+  constexpr int kWake_ms = 1, kStep_ms = 6, kLateStep_ms = 13;
   constexpr std::int64_t kStart_ns = 1'000'000'000, kMs_ns = 1'000'000;
   const auto device = haptics::MakeScriptedDevice(scene, 0, haptics::HandModel(scene.haptics));
   haptics::Servo servo(haptics::ServoSettingsOf(scene), {device.get()});
   physics::TissueSimulation simulation(scene);
   const int period_ms = static_cast<int>(std::lround(1e3f * scene.physics.dt_s));
   std::vector<Sample> samples;
+  simulation.SetCheaper(late ? 1 : 0);
   ContactModel model;
+  int model_ms = 0;
   model.stamp.epoch = 1;
   model.physics_dt_s = scene.physics.dt_s;
   for (int ms = 0; ms < static_cast<int>(1e3 * scene.script_duration_s); ++ms) {
@@ -182,13 +186,15 @@ std::vector<Sample> Simulate(const SceneView& scene) {
     tick.dt_s = 1e-3;
     tick.session_time_s = 1e-3 * ms;
     tick.stamp_ns = kStart_ns + ms * kMs_ns;
-    if (ms % period_ms == kModel_ms) servo.OfferModel(model, tick.stamp_ns);
+    if (ms == model_ms) servo.OfferModel(model, tick.stamp_ns);
     servo.Step(tick);
     samples.push_back({tick.session_time_s, servo.record().tool.tools[0], false, 0});
-    if (ms % period_ms == kWake_ms) {
+    const int turn = late ? ms / period_ms % 3 : 0;
+    if (ms % period_ms == kWake_ms && turn != 2) {
       const int of_ms = ms - kWake_ms;
       const auto at = static_cast<std::size_t>(of_ms);
-      (void)simulation.Step({InputOf(scene, samples[at], samples[at].time_s)});
+      (void)simulation.Step({InputOf(scene, samples[at], samples[at].time_s)}, late && turn == 0 ? 2 : 1);
+      model_ms = ms + (turn == 1 ? kLateStep_ms : kStep_ms);
       model.devices[0] = simulation.Contacts(0);
       model.tool_sequence = ++model.stamp.sequence;
       model.stamp.stamp_ns = tick.stamp_ns;
@@ -280,10 +286,10 @@ int RunLive(benchmark::Report* report) {
   return 0;
 }
 
-void RunInTime(benchmark::Report* report) {
+void RunSimulated(bool late, benchmark::Report* report) {
   const scene::SceneData data = scene::BuildProcedural(LiveScene());
   const SceneView scene = data.View();
-  AddErrors(scene, "in_time", Simulate(scene), report);
+  AddErrors(scene, late ? "late" : "in_time", Simulate(scene, late), report);
 }
 
 }  // namespace
@@ -291,6 +297,7 @@ void RunInTime(benchmark::Report* report) {
 
 int main(int argc, char** argv) {
   fulcrum::benchmark::Report report(argc, argv);
-  if (report.Wants("haptics.in_time")) fulcrum::RunInTime(&report);
+  if (report.Wants("haptics.in_time")) fulcrum::RunSimulated(false, &report);
+  if (report.Wants("haptics.late")) fulcrum::RunSimulated(true, &report);
   return report.Wants("haptics.live") ? fulcrum::RunLive(&report) : 0;
 }

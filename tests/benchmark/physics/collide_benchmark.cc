@@ -139,10 +139,10 @@ std::vector<Cost> Pass(const SceneView& scene, Counts* most) {
         continue;
       }
       const double begin = NowUs();
-      const bool touches = cautery.Update(i, tools[i].pose, collision).touching;
+      const bool touches = cautery.Update(i, tools[i].pose, collision, scene.physics.dt_s).touching;
       footprint = touches ? NowUs() - begin : 0;
       const double begin_slits = NowUs();
-      const bool touches_lips = cut_cautery.Update(i, tools[i].pose, collision).touching;
+      const bool touches_lips = cut_cautery.Update(i, tools[i].pose, collision, scene.physics.dt_s).touching;
       slits = touches_lips ? NowUs() - begin_slits : 0;
     }
     most->tissue_rows = std::max(most->tissue_rows, rows.size());

@@ -67,6 +67,22 @@ TEST(Breathing, TheWallPushesTheTissueAndLetsItComeBackAndSleep) {
   EXPECT_NEAR(simulation.simulated_time_s(), 2.0 * kPeriod, 1e-5);
 }
 
+TEST(Breathing, LongStepsKeepItsTime) {
+  const scene::SceneData data = UnderAWall();
+  TissueSimulation short_steps(data.View()), long_steps(data.View());
+  for (int period = 0, turn = 0; period < kPeriodSteps / 2; ++turn) {
+    const int periods = std::min(1 + turn % 3, kPeriodSteps / 2 - period);
+    for (int i = 0; i < periods; ++i) {
+      short_steps.Step({});
+    }
+    long_steps.Step({}, static_cast<std::uint64_t>(periods));
+    period += periods;
+    ASSERT_EQ(long_steps.simulated_time_s(), short_steps.simulated_time_s());
+    ASSERT_NEAR(long_steps.MaxDisplacement(), short_steps.MaxDisplacement(), 4e-4f) << period;
+  }
+  EXPECT_GT(long_steps.MaxDisplacement(), 0.8f * (kAmplitude - kAbove));
+}
+
 TEST(Breathing, AWallOutOfReachWakesNobody) {
   const scene::SceneData data = UnderAWall(0.6f * kAbove);
   TissueSimulation simulation(data.View());

@@ -215,7 +215,7 @@ class Still {
     std::array<ToolCollision::ToolMotion, kMaxTools> motion;
     motion[1] = {ShapeOf(scene_.tools[1], pose), ShapeOf(scene_.tools[1], pose)};
     collision_.FindPairs(motion, true);
-    return probe_.Update(1, pose, collision_);
+    return probe_.Update(1, pose, collision_, scene_.physics.dt_s);
   }
   /// Number of places of the sheet that the foot of the last Through() would push.
   [[nodiscard]] int Pushed() {

@@ -116,17 +116,17 @@ TEST_F(Grasps, SlipsAboveTheGripOfItsJawAngleOnly) {
     const ToolPose pose = Down(kMiddle, jaw);
     const Vec3f before = grasp_.held().front().p_T;
     for (int i = 0; i < 100; ++i) {
-      grasp_.Slip(Vec3f(0.99f * grip, 0, 0), scene_.tools[0], pose, model_, &particles_);
+      grasp_.Slip(Vec3f(0.99f * grip, 0, 0), scene_.physics.dt_s, scene_.tools[0], pose, model_, &particles_);
     }
     EXPECT_EQ(grasp_.held().front().p_T, before);
     for (int i = 0; i < 10; ++i) {  // Longer than a jolt.
-      grasp_.Slip(Vec3f(1.2f * grip, 0, 0), scene_.tools[0], pose, model_, &particles_);
+      grasp_.Slip(Vec3f(1.2f * grip, 0, 0), scene_.physics.dt_s, scene_.tools[0], pose, model_, &particles_);
     }
     const Vec3f crept = grasp_.held().front().p_T - before;
     EXPECT_GT(crept.x(), 0.0f);  // Along the traction, which is x of the tool, too.
     EXPECT_LT(crept.norm(), 0.003f);
     for (int i = 0; i < 400; ++i) {
-      grasp_.Slip(Vec3f(2.0f * grip, 0, 0), scene_.tools[0], pose, model_, &particles_);
+      grasp_.Slip(Vec3f(2.0f * grip, 0, 0), scene_.physics.dt_s, scene_.tools[0], pose, model_, &particles_);
     }
     EXPECT_FALSE(grasp_.holding());  // All tissue is out of the jaws.
     for (Index p = 0; p < particles_.particle_count(); ++p) {

@@ -165,6 +165,21 @@ TEST_F(PhysicsNodeTest, LateStepsMakeItCheaperForAWhile) {
   EXPECT_EQ(bench.Figure("cheaper_presets"), -1);
 }
 
+TEST_F(PhysicsNodeTest, SkippedPeriodsAreSimulatedButNotAStandstill) {
+  Bench bench(scene_, nullptr);
+  const auto advance_ms = [&](std::uint64_t skipped) {
+    const double before_s = bench.node_.simulation().simulated_time_s();
+    bench.tick_.index += skipped;
+    bench.Step();
+    return std::lround(1e3 * (bench.node_.simulation().simulated_time_s() - before_s));
+  };
+  EXPECT_EQ(advance_ms(40), 10) << "the first step has no predecessor";
+  EXPECT_EQ(advance_ms(0), 10);
+  EXPECT_EQ(advance_ms(1), 20);
+  EXPECT_EQ(advance_ms(2), 30);
+  EXPECT_EQ(advance_ms(100), 30);
+}
+
 TEST_F(PhysicsNodeTest, TellsEachReaderWhatItNeeds) {
   Bench bench(scene_, nullptr);
   auto frames = bench.bus_.frames.MakeInput();
