@@ -24,6 +24,7 @@ struct ContactRow {
   std::uint32_t source = 0;          ///< Index of the pair that made the row.
   float force_N = 0;                 ///< Out: normal force after the step.
   Vec3f friction_N = Vec3f::Zero();  ///< Out: friction force on the tissue.
+  Vec3f unbalanced_N = Vec3f::Zero();  ///< Out: part of both that the tissue does not resist yet (mode accurate).
 
   /// sum_k weight_k x_k of a field in the layout of the particle pool.
   [[nodiscard]] Vec3f At(const float* field) const {

@@ -200,6 +200,7 @@ void ToolCollision::Rows(float u0, float u1, std::vector<ContactRow>* rows) {
   }
   for (ContactRow& row : *rows) {
     row.force_N = 0.0f;
+    row.unbalanced_N.setZero();
   }
 }
 
@@ -208,11 +209,23 @@ void ToolCollision::TakeForces(std::span<const ContactRow> rows) {
   for (ContactPair& pair : pairs_) {
     pair.touching = false;
   }
+  std::array<Vec3f, kMaxTools> pressure, unbalanced;
+  pressure.fill(Vec3f::Zero());
+  unbalanced.fill(Vec3f::Zero());
   for (const ContactRow& row : rows) {
     if (row.source < pairs_.size()) {
+      const std::uint32_t tool = pairs_[row.source].capsule / kMaxCapsules;
       pairs_[row.source].touching = row.force_N > 0.0f;
-      force_[pairs_[row.source].capsule / kMaxCapsules] -= row.force_N * row.normal + row.friction_N;
+      pressure[tool] += row.force_N * row.normal;
+      unbalanced[tool] += row.unbalanced_N;
+      force_[tool] -= row.force_N * row.normal + row.friction_N;
     }
+  }
+  // What the tissue does not resist yet is no force on the tool, which is prescribed. Along the normal alone: with the
+  // part along the surface, the forces of sliding tools are farther off.
+  for (std::size_t tool = 0; tool < kMaxTools; ++tool) {
+    const Vec3f normal = pressure[tool].stableNormalized();
+    force_[tool] += std::min(pressure[tool].norm(), normal.dot(unbalanced[tool])) * normal;
   }
 }
 

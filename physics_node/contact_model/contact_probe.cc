@@ -31,6 +31,8 @@ constexpr float kSurfaceRadius = 0.012f, kGraspRadius = 0.03f;
 constexpr float kMinDent = 0.0005f;
 /// Bounds of what is measured, beyond any use: displacement [m], its rate [m/s], velocity of the surroundings [m/s].
 constexpr float kMaxDisplacement = 0.2f, kMaxRate = 2.0f, kMaxSurroundings = 1.0f;
+/// Farthest from the median that the force of a step counts as it is: relative to the median, and at zero force [N].
+constexpr float kNearMedian = 0.1f, kNearMedian_N = 0.01f;
 /// Largest coefficient of friction in a Contact.
 constexpr float kMaxFriction = 2.0f;
 /// Least length of the averaged normal for it to have a direction.
@@ -169,7 +171,8 @@ void ContactProbe::MedianFilter(std::uint32_t tool, const ToolForce& force) {
                      [axis](const Vec3f& a, const Vec3f& b) { return a[axis] < b[axis]; });
     memory.force[axis] = now[kMedian / 2][axis];
   }
-  memory.force = Limited(memory.force, ContactProbe::kForceCap_N);
+  const float near = kNearMedian * memory.force.norm() + kNearMedian_N;
+  memory.force = Limited(memory.force + Limited(newest.force - memory.force, near), ContactProbe::kForceCap_N);
 }
 
 Contact ContactProbe::MakeContact(std::uint32_t tool) {

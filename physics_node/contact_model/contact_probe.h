@@ -2,7 +2,7 @@
 // force, and the dependence of the force on the position of the tool.
 //
 //   f_ref   force of the tissue on the tool [N]. With the force of the solver: of a grasp unfiltered; of a surface the
-//           median of the last kMedian steps, older ones changed by the stiffness for the way of the tip since then,
+//           last step, kept near the median of kMedian, older ones changed by the stiffness for the way of the tip,
 //           with x_ref the mean place of the tip meanwhile, as f_ref is a mean over the last period of a step. Else the
 //           elastic force of the edges of the touched or held particles (elastic_force.h), low-passed over kFilterTime
 //   u_c     displacement of the tissue at the contact relative to its surroundings, a ring at kRingRadius [m]: a tent

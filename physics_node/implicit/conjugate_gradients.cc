@@ -38,8 +38,8 @@ void ShortenCorrections(const FieldLayout& layout, FloatArray* d) {
   }
 }
 
-/// Halves the correction until the energy is no larger than without it. The trial point is in Krylov q.
-void SearchAlongCorrection(const SolverContext& context, const Inertia& inertia, std::span<const ContactRow> contacts,
+/// Halves the correction until the energy is no larger than without it; true: it did. The trial point is in Krylov q.
+bool SearchAlongCorrection(const SolverContext& context, const Inertia& inertia, std::span<const ContactRow> contacts,
                            SolverState* state, SolverScratch* scratch) {
   const FieldLayout& layout = context.model.layout;
   const FloatArray& point = state->linearisation.point;
@@ -54,12 +54,13 @@ void SearchAlongCorrection(const SolverContext& context, const Inertia& inertia,
       });
     });
     if (EnergyAt(context, trial, inertia, contacts, state, scratch) <= before || halving == kHalvings) {
-      break;
+      return halving > 0;
     }
     for (std::size_t i = 0; i < layout.tube_floats + 3 * layout.plane; ++i) {
       d[i] *= 0.5f;
     }
   }
+  return true;
 }
 
 }  // namespace
@@ -335,9 +336,10 @@ Correction LimitCorrection(const SolverContext& context, const Inertia& inertia,
   correction.largest_m = std::sqrt(*std::max_element(by_region.begin(), by_region.end()));
   if (correction.largest_m > kLargestCorrection_m) {
     ShortenCorrections(context.model.layout, &scratch->krylov.d);
+    correction.shortened = true;
   }
   if (correction.largest_m > kDoubtfulCorrection_m) {
-    SearchAlongCorrection(context, inertia, contacts, state, scratch);
+    correction.shortened |= SearchAlongCorrection(context, inertia, contacts, state, scratch);
     correction.line_searched = true;
   }
   return correction;

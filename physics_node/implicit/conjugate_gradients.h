@@ -64,6 +64,7 @@ class LinearSolver {
 struct Correction {
   float largest_m = 0;  ///< Before the limits.
   bool line_searched = false;
+  bool shortened = false;  ///< The residual is that of a longer one.
 };
 /// Limits the correction that a solve has left in Krylov d, and halves it while it raises the energy.
 [[nodiscard]] Correction LimitCorrection(const SolverContext& context, const Inertia& inertia,

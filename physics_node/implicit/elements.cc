@@ -162,6 +162,8 @@ Elements::Elements(const TissueScene& scene, const ElasticModel& model, const Pa
   contacts_.reserve(kReservedContacts);
   contact_force_.reserve(kReservedContacts);
   contact_product_.reserve(kReservedContacts);
+  contact_row_.reserve(kReservedContacts);
+  row_weights_ = FloatArray(particles.raw().size());
   shares_.assign(static_cast<std::size_t>(partition.count()), {});
   for (std::uint32_t i = 0; i < bindings_.size(); ++i) {
     const Element& e = bindings_[i];
@@ -229,7 +231,9 @@ void Elements::FindContacts(float h, const float* place, const float* start, con
                             std::span<const ContactRow> contacts) {
   contacts_.clear();
   contact_force_.clear();
-  for (const ContactRow& row : contacts) {
+  contact_row_.clear();
+  for (std::uint32_t i = 0; i < contacts.size(); ++i) {
+    const ContactRow& row = contacts[i];
     if (!regions.all_computed() && !AnyMarked(row, regions.partition(), regions.computed().marked)) {
       continue;
     }
@@ -242,6 +246,7 @@ void Elements::FindContacts(float h, const float* place, const float* start, con
       e.kt = state.tangential;
       e.m = row.normal * std::sqrt(std::max(state.stiffness + state.damping - e.kt, 0.0f));
       contacts_.push_back(e);
+      contact_row_.push_back(i);
       contact_force_.push_back(row.normal * state.force - state.slide * state.tangential);
     }
   }
@@ -338,6 +343,32 @@ void Elements::WriteForces(float h, const float* place, const float* d, const fl
     row.force_N = std::max(state.force, 0.0f);
     row.friction_N = state.force > 0.0f ? Vec3f(-state.tangential * state.slide) : Vec3f(Vec3f::Zero());
   }
+}
+
+void Elements::WriteUnbalanced(const float* d, const float* residual, std::span<ContactRow> contacts) {
+  const auto for_particles = [this](const auto& body) {
+    for (std::size_t i = 0; i < contacts_.size(); ++i) {
+      for (std::size_t k = 0; IsStiff(contacts_[i]) && k < static_cast<std::size_t>(contacts_[i].count); ++k) {
+        body(i, contacts_[i].at[k], contacts_[i].weight[k]);
+      }
+    }
+  };
+  for_particles([&](std::size_t, ParticleRef at, float) { row_weights_[at.base] = 0.0f; });
+  for_particles([&](std::size_t, ParticleRef at, float weight) { row_weights_[at.base] += weight; });
+  for (std::size_t i = 0; i < contacts_.size(); ++i) {
+    if (IsStiff(contacts_[i])) {
+      const Element& e = contacts_[i];
+      ContactRow& row = contacts[contact_row_[i]];
+      const Vec3f along = Combine(e, d), linear = contact_force_[i] - e.kt * along - e.m * e.m.dot(along);
+      row.unbalanced_N = row.force_N * row.normal + row.friction_N - linear;
+    }
+  }
+  for_particles([&](std::size_t i, ParticleRef at, float weight) {
+    ContactRow& row = contacts[contact_row_[i]];
+    if (row_weights_[at.base] > 0.0f) {
+      row.unbalanced_N += weight / row_weights_[at.base] * FieldAt(residual, at);
+    }
+  });
 }
 
 }  // namespace fulcrum::physics::implicit

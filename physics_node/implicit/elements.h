@@ -111,6 +111,9 @@ class Elements {
   /// Normal and friction forces of contacts with tools at `place` + `d`, sliding measured from `start`, h ago.
   static void WriteForces(float h, const float* place, const float* d, const float* start,
                           std::span<ContactRow> contacts);
+  /// Afterwards, for those of the linearisation: the part of these forces that the truncated solve has left unbalanced,
+  /// from its `residual` at `d`. A particle of several rows counts by weight.
+  void WriteUnbalanced(const float* d, const float* residual, std::span<ContactRow> contacts);
   /// Stiffness of a contact in its normal direction [N/m].
   [[nodiscard]] static float ContactStiffness(const ContactRow& row);
   /// Of tissue with tissue, not with a tool.
@@ -137,6 +140,8 @@ class Elements {
   Selection computed_;
   FloatArray binding_force_;  ///< xyz_ by binding: at the linearisation, or of the last product; 0 where severed.
   std::vector<Vec3f> contact_force_, contact_product_;
+  std::vector<std::uint32_t> contact_row_;  ///< Rows that the contacts were made of.
+  FloatArray row_weights_;                  ///< By pool offset: sum of the weights of a particle in the rows.
   bool contacts_excluded_ = false;
   HingeMatrix hinges_;
   InversionGuard guard_;

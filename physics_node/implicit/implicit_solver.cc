@@ -203,6 +203,10 @@ SubstepReport ImplicitSolver::Substep(float h, int iterations, std::span<const H
   // Before the update: the start of the substep is still in the store.
   Elements::WriteForces(h, state_.linearisation.point.data(), scratch_.krylov.d.data(), context_.particles.pool(),
                         contacts);
+  // A correction that was shortened has another residual.
+  if (state_.contact_zone.active && !correction.shortened) {
+    state_.elements.WriteUnbalanced(scratch_.krylov.d.data(), state_.linearisation.residual.data(), contacts);
+  }
   SubstepReport report = Finish(context_, h, &state_, &scratch_);
   state_.regions.UpdateSleep(scratch_.speed, h);
 

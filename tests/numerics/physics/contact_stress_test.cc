@@ -161,7 +161,7 @@ float PeakForce(const SceneView& scene, int missed) {
   return peak;
 }
 
-TEST(LateTools, TapsPressNoHarderWherePeriodsAreMissed) {
+TEST(LateTools, TapsPressAsHardWherePeriodsAreMissed) {
   scene::SceneSettings settings = scene::BuiltIn();
   settings.script.clear();
   for (int i = 0; i < 9; ++i) {
@@ -177,7 +177,7 @@ TEST(LateTools, TapsPressNoHarderWherePeriodsAreMissed) {
   ASSERT_GT(in_time, 0.1f);
   for (const int missed : {2, 3, 4}) {
     const float late = PeakForce(data.View(), missed);
-    EXPECT_NEAR(late, in_time, 0.03f * in_time) << missed;
+    EXPECT_NEAR(late, in_time, 0.1f * in_time) << missed;
   }
 }
 
