@@ -45,7 +45,7 @@ bool SearchAlongCorrection(const SolverContext& context, const Inertia& inertia,
   const FloatArray& point = state->linearisation.point;
   FloatArray &d = scratch->krylov.d, &trial = scratch->krylov.q;
   const double before = EnergyAt(context, point, inertia, contacts, state, scratch);
-  for (int halving = 0; halving <= kHalvings; ++halving) {
+  for (int halving = 0;; ++halving) {
     ForTasks(&context.workers, state->regions.computed(), [&](const Task& task, int, int) {
       ForPieces(layout, task, [&](std::size_t first, std::size_t count) {
         for (std::size_t i = first; i < first + count; ++i) {
@@ -60,7 +60,6 @@ bool SearchAlongCorrection(const SolverContext& context, const Inertia& inertia,
       d[i] *= 0.5f;
     }
   }
-  return true;
 }
 
 }  // namespace
