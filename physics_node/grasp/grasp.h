@@ -39,9 +39,9 @@ class Grasp {
   [[nodiscard]] static float GripForce(const PhysicsParams& params, float jaw_rad);
   /// Share of the grip that acts on a held particle: 1 between the jaws, less towards grasp_radius.
   [[nodiscard]] float HoldOf(const HeldParticle& held, const ToolDescription& tool) const;
-  /// Once a step: above GripForce the tissue creeps out of the jaws along the traction, the force of the tissue on the
-  /// tool [N, frame W]. The solver reports it as the sum of the forces on the held particles; otherwise it is estimated
-  /// from the edges. Particles that leave the jaws are released.
+  /// Once a step, of length step_s: above GripForce the tissue creeps out of the jaws along the traction, the force of
+  /// the tissue on the tool [N, frame W]. The solver reports it as the sum of the forces on the held particles;
+  /// otherwise it is estimated from the edges. Particles that leave the jaws are released.
   void Slip(const Vec3f& traction_W, float step_s, const ToolDescription& tool, const ToolPose& pose,
             const TissueModel& model, ParticleStore* particles);
   /// Releases particles that have been cut off.
