@@ -1,6 +1,8 @@
 #include "physics_node/implicit/implicit_solver.h"
 
 #include <algorithm>
+#include <chrono>
+#include <utility>
 
 #include "physics_node/implicit/conjugate_gradients.h"
 #include "physics_node/implicit/phases.h"
@@ -16,6 +18,18 @@ constexpr float kFarthest_m = 10.0f;
 /// grows; shorter substeps converge without (deploy/docs/measurements/physics, Release).
 constexpr float kLargeCorrection_m = 0.001f, kLongSubstep_s = 0.004f;
 constexpr int kMoreIterations = 4;
+
+/// Time since the last call, or since it was made [ns].
+class Lap {
+ public:
+  std::int64_t operator()() {
+    const auto now = std::chrono::steady_clock::now(), last = std::exchange(last_, now);
+    return std::chrono::nanoseconds(now - last).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
 
 /// Of TouchedRegions::touched.
 constexpr std::uint8_t kTouched = 1, kTouchedByMoving = 2;
@@ -179,6 +193,8 @@ std::uint32_t ImplicitSolver::BeginStep() {
 
 SubstepReport ImplicitSolver::Substep(float h, int iterations, std::span<const HeldPlace> held,
                                       std::span<ContactRow> contacts) {
+  Lap lap;
+  SubstepTimes times;
   const Inertia inertia = model_.InertiaOf(h);
   const BoundaryConditions boundary{held, contacts};
   WakeTouched(context_, boundary, &scratch_.touched, &state_.touched, &state_.regions);
@@ -187,7 +203,9 @@ SubstepReport ImplicitSolver::Substep(float h, int iterations, std::span<const H
   }
 
   const std::uint32_t resets = Predict(context_, inertia, boundary, &state_, &scratch_);
+  times.prediction_ns = lap();
   Linearise(context_, inertia, contacts, &state_, &scratch_);
+  times.linearisation_ns = lap();
 
   const LinearSystem system(context_, inertia.inertia, &state_, &scratch_);
   LinearSolver solver(context_, system, &state_, &scratch_);
@@ -198,6 +216,7 @@ SubstepReport ImplicitSolver::Substep(float h, int iterations, std::span<const H
   if (state_.contact_zone.active) {
     solver.DescendInContactZone();
   }
+  times.solve_ns = lap();
 
   const Correction correction = LimitCorrection(context_, inertia, contacts, &state_, &scratch_);
   // Before the update: the start of the substep is still in the store.
@@ -212,6 +231,8 @@ SubstepReport ImplicitSolver::Substep(float h, int iterations, std::span<const H
 
   state_.largest_correction_m = report.largest_correction_m = correction.largest_m;
   report.line_searched = correction.line_searched;
+  times.update_ns = lap();
+  report.times = times;
   report.resets += resets;
   return report;
 }

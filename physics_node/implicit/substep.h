@@ -24,11 +24,17 @@ struct BoundaryConditions {
   std::span<ContactRow> contacts;
 };
 
+/// Where the time of a substep went [ns].
+struct SubstepTimes {
+  std::int64_t prediction_ns = 0, linearisation_ns = 0, solve_ns = 0, update_ns = 0;
+};
+
 struct SubstepReport {
   float largest_correction_m = 0;  ///< Of the solve, to the prediction.
   float largest_speed_m_s = 0;
   std::uint32_t resets = 0;    ///< Particles put back because they were not finite.
   bool line_searched = false;  ///< The correction was compared in energy with the prediction.
+  SubstepTimes times;
 };
 
 /// point <- the prediction x*. Returns how many velocities were not finite.

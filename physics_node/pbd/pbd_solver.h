@@ -32,6 +32,7 @@ class PbdSolver {
   FinishResult Finish();
   /// Sets all velocities to zero.
   void Stop();
+  [[nodiscard]] std::uint32_t iterations() const { return params_.iterations; }
 
  private:
   [[nodiscard]] GridArrays Grid() const;

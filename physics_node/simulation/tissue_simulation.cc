@@ -1,6 +1,7 @@
 #include "physics_node/simulation/tissue_simulation.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 #include "physics_node/collision/row_projection.h"
@@ -23,19 +24,27 @@ constexpr int kIterationsOfShort = 2;
 /// mm.
 constexpr float kMostCoordinate_m = 10.0f, kMostTravel_m = 0.2f;
 
+bool Printed(const TissueScene& scene) {
+  return scene.physics.mode == PhysicsMode::kPaper && scene.physics.as == PaperForm::kPrinted;
+}
+
 }  // namespace
 
 TissueSimulation::TissueSimulation(const TissueScene& scene, int threads, InstructionSet set)
     : scene_(scene),
       particles_(scene),
       model_(scene, &particles_),
-      solver_(scene.physics, &model_, &particles_, pbd::KernelsFor(set), tissue::KernelsFor(set)),
+      solver_(Printed(scene) ? AsPrinted(scene.physics) : scene.physics, &model_, &particles_, pbd::KernelsFor(set),
+              tissue::KernelsFor(set)),
       collision_(scene, &model_, &particles_, collision::KernelsFor(set)),
       tissue_collision_(scene, &model_, &particles_, collision::KernelsFor(set)),
       grasps_{Grasp(scene), Grasp(scene), Grasp(scene), Grasp(scene)},
       contacts_(scene, &model_, &particles_),
       cautery_(scene, &model_, &particles_),
       tears_(scene, &model_, &particles_) {
+  if (Printed(scene)) {
+    printed_.emplace(scene, &model_, &particles_);
+  }
   if (scene.physics.mode != PhysicsMode::kPaper) {
     const ElasticModel elastic = BuildElasticModel(scene);
     if (scene.physics.mode == PhysicsMode::kXpbd) {
@@ -75,8 +84,8 @@ StepReport TissueSimulation::StepPaper() {
   }
   FindContacts(true);
   collision_.Sweep();
-  for (std::uint32_t iteration = 0; iteration < scene_.physics.iterations; ++iteration) {
-    solver_.Iterate();
+  for (std::uint32_t iteration = 0; iteration < solver_.iterations(); ++iteration) {
+    printed_ ? printed_->Iterate() : solver_.Iterate();
     collision_.Project();
   }
   const FinishResult finish = solver_.Finish();
@@ -183,8 +192,14 @@ StepReport TissueSimulation::StepAccurate() {
   report.resets = implicit_->BeginStep();
   const std::span<const float> moved = implicit_->moved();
   moved_.assign(moved.begin(), moved.end());
+  auto begun = std::chrono::steady_clock::now();
+  const auto end_contacts = [&] {
+    report.stages.contacts_ns += std::chrono::nanoseconds(std::chrono::steady_clock::now() - begun).count();
+  };
   FindAllContacts(h);
+  end_contacts();
   for (int i = 0; i < count; ++i) {
+    begun = std::chrono::steady_clock::now();
     const float u0 = static_cast<float>(i) / substeps, u1 = static_cast<float>(i + 1) / substeps;
     PlaceHeld(u1);
     constexpr int kParts = TissueCollision::kParts;
@@ -196,6 +211,7 @@ StepReport TissueSimulation::StepAccurate() {
       }
     });
     tissue_collision_.JoinRows(&rows_);
+    end_contacts();
     const implicit::SubstepReport substep = implicit_->Substep(h, iterations, held_places_, rows_);
     collision_.TakeForces(rows_);
     for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
@@ -206,6 +222,10 @@ StepReport TissueSimulation::StepAccurate() {
       mean.tip += share * (from + u1 * (to - from) - mean.tip);
     }
     report.resets += substep.resets;
+    report.stages.prediction_ns += substep.times.prediction_ns;
+    report.stages.linearisation_ns += substep.times.linearisation_ns;
+    report.stages.solve_ns += substep.times.solve_ns;
+    report.stages.update_ns += substep.times.update_ns;
     largest_speed_ = substep.largest_speed_m_s;
     report.max_step_m = std::max(report.max_step_m, largest_speed_ * step_s());
   }
@@ -233,7 +253,9 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools,
   const bool holds = grasps_[0].holding() || grasps_[1].holding();
   sleep_.asleep = sleep_.asleep && !held && !holds;
   if (StaysAsleep()) {
-    return {true, 0.0f, 0};
+    StepReport report;
+    report.asleep = true;
+    return report;
   }
   ++counters_.state_version;
   const StepReport report = implicit_ ? StepAccurate() : xpbd_ ? StepXpbd() : StepPaper();

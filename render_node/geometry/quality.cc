@@ -11,7 +11,9 @@ namespace {
 
 constexpr double kBudget_ms = 28;  // Of the 33 ms at 30 pictures a second, with a reserve for load peaks.
 constexpr double kStepCost = 1.5;  // A step finer costs up to this factor more.
-constexpr int kCalmWindows = 6;    // About two seconds, to prevent oscillation.
+constexpr double kSmoothBudget_ms = 12, kSmoothStepCost = 2;  // The same for scales above 1.
+constexpr int kCalmWindows = 6;                               // About two seconds, to prevent oscillation.
+constexpr int kMostSmoothLines = 1440;  // Of larger pictures the textures would take half a gigabyte.
 constexpr float kFewestLines = 270;
 constexpr float kHalf = 0.52f;            // A coarser step is for large pictures only …
 constexpr float kFewestLinesLarge = 374;  // … which have at least as many lines then.
@@ -31,21 +33,28 @@ Quality QualityFromName(std::string_view name) {
   throw InputError("--quality: \"" + std::string(name) + "\"; valid: auto, low, high");
 }
 
-QualityControl::QualityControl(Quality quality, int height) : quality_(quality), first_(quality == Quality::kAuto) {
+QualityControl::QualityControl(Quality quality, int height, bool smooth)
+    : quality_(quality), smooth_(smooth), first_(quality == Quality::kAuto) {
   SetHeight(height);
 }
+
+double QualityControl::BudgetOf(std::size_t step) const { return step < kFull ? kSmoothBudget_ms : kBudget_ms; }
+double QualityControl::CostOfFiner(std::size_t step) const { return step <= kFull ? kSmoothStepCost : kStepCost; }
 
 void QualityControl::SetHeight(int height) {
   const float lines = kScales[step_] * static_cast<float>(height_);
   const auto enough = [height](float scale) {
     return scale * static_cast<float>(height) >= (scale < kHalf ? kFewestLinesLarge : kFewestLines);
   };
-  last_step_ = 0;
+  first_step_ = smooth_ && height <= kMostSmoothLines ? 0 : kFull;
+  last_step_ = kFull;
   while (last_step_ + 1 < kScales.size() && enough(kScales[last_step_ + 1])) ++last_step_;
-  if (quality_ == Quality::kLow) {
+  if (quality_ == Quality::kHigh) {
+    step_ = first_step_;
+  } else if (quality_ == Quality::kLow) {
     step_ = last_step_;
   } else if (quality_ == Quality::kAuto && height_ > 0) {
-    step_ = 0;
+    step_ = kFull;
     while (step_ < last_step_ && kScales[step_] * static_cast<float>(height) > lines) ++step_;
     first_ = true;
     count_ = 0;
@@ -68,11 +77,12 @@ void QualityControl::Add(double draw_ms) {
   count_ = 0;
   std::nth_element(cost_ms_.begin(), cost_ms_.begin() + kWindow / 2, cost_ms_.end());
   double median_ms = cost_ms_[kWindow / 2];
-  calm_ = median_ms * kStepCost < kBudget_ms ? calm_ + 1 : 0;
-  if (median_ms > kBudget_ms && step_ < last_step_) {
+  const auto finer_fits = [&] { return step_ > first_step_ && median_ms * CostOfFiner(step_) < BudgetOf(step_ - 1); };
+  calm_ = finer_fits() ? calm_ + 1 : 0;
+  if (median_ms > BudgetOf(step_) && step_ < last_step_) {
     ++step_;
   } else if (calm_ >= kCalmWindows) {
-    for (; step_ > 0 && median_ms * kStepCost < kBudget_ms; --step_) median_ms *= kStepCost;
+    for (; finer_fits(); --step_) median_ms *= CostOfFiner(step_);
     calm_ = 0;
   }
 }

@@ -43,12 +43,13 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
       display_(*stage_->display),
       shape_{0, 0, static_cast<int>(scene.render.width), static_cast<int>(scene.render.height)},
       writer_(settings.frames),
-      quality_(settings.quality, static_cast<int>(scene.render.height)),
+      quality_(settings.quality, static_cast<int>(scene.render.height), display_.is_gpu()),
       operator_stamper_(runtime::MonotonicNs()),
       picture_stamper_(runtime::MonotonicNs()),
       camera_(scene.render),
       lens_(scene),
       figures_(scene.render.hud != 0) {
+  view_.SetMostScale(quality_.most());
   if (ports_.pictures != nullptr) stream_ = std::make_unique<PictureStream>(ports_.pictures);
   if (ports_.operator_input == nullptr) return;
   const auto write = [this](const OperatorInput& input) {
@@ -272,6 +273,7 @@ void RenderNode::TakeSize() {
   if (shape.width != shape_.width || shape.height != shape_.height) {
     view_.SetSize(shape.width, shape.height);
     quality_.SetHeight(shape.height);
+    view_.SetMostScale(quality_.most());
   }
   shape_ = shape;
   changed_on_screen_ = true;

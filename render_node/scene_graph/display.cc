@@ -3,6 +3,7 @@
 #include <osg/GLExtensions>
 #include <osgGA/GUIEventHandler>
 #include <osgViewer/Viewer>
+#include <string_view>
 #include <utility>
 
 #include "render_node/offscreen/egl_context.h"
@@ -27,6 +28,11 @@ void SetUpViewer(const LaparoscopeView& view, osgViewer::Viewer* viewer) {
 void SetUpState(osg::State* state) {
   state->setUseModelViewAndProjectionUniforms(true);
   state->setUseVertexAttributeAliasing(true);
+}
+
+/// Mesa's software rasterisers by their names in GL_RENDERER.
+bool IsGpu(std::string_view renderer) {
+  return renderer.find("llvmpipe") == std::string_view::npos && renderer.find("softpipe") == std::string_view::npos;
 }
 
 class OffscreenDisplay : public Display {
@@ -71,6 +77,7 @@ class OffscreenDisplay : public Display {
   [[nodiscard]] std::vector<int> TakeKeys() override { return {}; }
   [[nodiscard]] PixelBox picture() const override { return picture_; }
   [[nodiscard]] bool closed() const override { return false; }
+  [[nodiscard]] bool is_gpu() const override { return IsGpu(context_.description()); }
   [[nodiscard]] std::string description() const override { return context_.description(); }
 
  private:
@@ -170,6 +177,9 @@ class WindowDisplay : public Display {
     if (!viewer_.isRealized()) {
       throw InputError("--window: the display refuses an OpenGL window");
     }
+    context_->makeCurrent();
+    if (const auto* renderer = glGetString(GL_RENDERER)) is_gpu_ = IsGpu(reinterpret_cast<const char*>(renderer));
+    context_->releaseContext();
     // The context is passed from the thread that opens the window to the thread that draws.
     viewer_.setReleaseContextAtEndOfFrameHint(true);
     window_ = std::make_unique<X11Window>(context_.get());
@@ -199,9 +209,11 @@ class WindowDisplay : public Display {
   }
   void ToggleFullScreen() override { window_->ToggleFullScreen(); }
   [[nodiscard]] bool closed() const override { return viewer_.done(); }
+  [[nodiscard]] bool is_gpu() const override { return is_gpu_; }
   [[nodiscard]] std::string description() const override { return "window"; }
 
  private:
+  bool is_gpu_ = false;
   osg::ref_ptr<ReadAfterDraw> read_ = new ReadAfterDraw;
   osg::ref_ptr<Keyboard> keys_ = new Keyboard;
   osg::ref_ptr<osg::GraphicsContext> context_;

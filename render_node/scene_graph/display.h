@@ -30,6 +30,8 @@ class Display {
   [[nodiscard]] virtual unsigned long window() const { return 0; }
   /// True after the user has closed the window.
   [[nodiscard]] virtual bool closed() const = 0;
+  /// A GPU draws, which has time to smooth edges.
+  [[nodiscard]] virtual bool is_gpu() const = 0;
   /// Renderer and version, for the log.
   [[nodiscard]] virtual std::string description() const = 0;
 };

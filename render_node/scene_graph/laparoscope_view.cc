@@ -7,6 +7,7 @@
 
 #include "render_node/geometry/atlas.h"
 #include "render_node/geometry/bleeding.h"
+#include "render_node/geometry/paper_colour.h"
 #include "render_node/geometry/texel.h"
 #include "render_node/geometry/tissue_pattern.h"
 #include "render_node/geometry/tool_shadow.h"
@@ -27,6 +28,21 @@ constexpr int kNoiseTexels = 256;
 constexpr int kSerosaTexels = 512;
 constexpr float kSerosaPerMetre = 16;  // As in membrane.frag.
 constexpr float kFatCover = 0.48f;     // fat.frag begins at 0.51.
+
+/// The numbers of the paper's eq. 15 for membrane.frag.
+void AddPrintedColour(bool printed, float ambient_C, osg::StateSet* state) {
+  PaperColour colour;
+  colour.ambient_C = ambient_C;
+  const auto vec4 = [](const Eigen::Vector4f& v) { return osg::Vec4(v.x(), v.y(), v.z(), v.w()); };
+  state->addUniform(new osg::Uniform("printed", printed ? 1.0f : 0.0f));
+  state->addUniform(new osg::Uniform(
+      "printed_limits", osg::Vec4(colour.ambient_C, colour.vaporisation_C, colour.vaporisation, colour.brown)));
+  const osg::ref_ptr<osg::Uniform> colours = new osg::Uniform(osg::Uniform::FLOAT_VEC4, "printed_colours", 3);
+  colours->setElement(0, vec4(colour.c1));
+  colours->setElement(1, vec4(colour.c2));
+  colours->setElement(2, vec4(colour.c3));
+  state->addUniform(colours);
+}
 
 }  // namespace
 
@@ -133,7 +149,9 @@ void LaparoscopeView::Impl::BindTextures() {
   state->addUniform(light_power);
   // Patches of the paper's model carry no damage.
   const bool by_temperature = scene.thermal.model == ThermalModel::kPaper;
-  state->addUniform(new osg::Uniform("colour_by_temperature", by_temperature ? 1.0f : 0.0f));
+  const bool printed = by_temperature && scene.thermal.as == PaperForm::kPrinted;
+  state->addUniform(new osg::Uniform("colour_by_temperature", by_temperature && !printed ? 1.0f : 0.0f));
+  AddPrintedColour(printed, scene.thermal.body_temperature_C, state);
   ShineFrom(scope);
   state->setMode(GL_LIGHTING, osg::StateAttribute::OFF);
 }
@@ -244,6 +262,8 @@ void LaparoscopeView::SetCamera(const RenderParams& params) {
 void LaparoscopeView::SetSoil(float soil) { impl_->optics.SetSoil(soil); }
 
 void LaparoscopeView::SetScale(float scale) { impl_->optics.SetScale(scale); }
+
+void LaparoscopeView::SetMostScale(float most) { impl_->optics.SetMostScale(most); }
 
 void LaparoscopeView::Update() {
   impl_->ShowFat();

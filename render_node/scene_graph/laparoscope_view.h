@@ -45,9 +45,11 @@ class LaparoscopeView {
   void SetCamera(const RenderParams& params);
   /// 0: clear lens … 1: nothing to be seen.
   void SetSoil(float soil);
-  /// Resolution of the scene as a share of the picture's width and height, in (0, 1]; text is always drawn at full
+  /// Resolution of the scene as a share of the picture's width and height, in (0, most]; text is always drawn at full
   /// resolution.
   void SetScale(float scale);
+  /// Largest scale, 1 at first; above it the scene's pixels are averaged.
+  void SetMostScale(float most);
 
   /// Updates the meshes after SetTissue and SetTopology; separate, so that several changes need one update only.
   /// Without a change the next picture reuses the last one of the scene.

@@ -98,14 +98,26 @@ void Optics::SetSize(const Laparoscope& scope, int width, int height) {
   scope_ = scope;
   width_ = width;
   height_ = height;
+  for (const Target& target : {background_, scene_}) target.camera->setProjectionMatrix(ToOsg(scope.projection));
+  ResizeTextures();
+}
+
+void Optics::SetMostScale(float most) {
+  if (most == most_) return;
+  most_ = most;
+  ResizeTextures();
+}
+
+int Optics::Texels(int pixels) const { return static_cast<int>(std::lround(most_ * static_cast<float>(pixels))); }
+
+void Optics::ResizeTextures() {
   for (const Target& target : {background_, scene_}) {
     for (osg::Texture2D* texture : {target.colour.get(), target.depth.get()}) {
-      texture->setTextureSize(width, height);
+      texture->setTextureSize(Texels(width_), Texels(height_));
       texture->dirtyTextureObject();
     }
     // Without this OpenSceneGraph keeps the framebuffer of the previous textures.
     target.camera->dirtyAttachmentMap();
-    target.camera->setProjectionMatrix(ToOsg(scope.projection));
   }
   UseScale();
 }
@@ -175,7 +187,7 @@ void Optics::SetScale(float scale) {
 
 void Optics::UseScale() {
   const auto pixels = [this](int full) {
-    return std::clamp(static_cast<int>(std::lround(scale_ * static_cast<float>(full))), 1, full);
+    return std::clamp(static_cast<int>(std::lround(scale_ * static_cast<float>(full))), 1, Texels(full));
   };
   const int width = pixels(width_), height = pixels(height_);
   background_.camera->setViewport(0, 0, width, height);
@@ -184,9 +196,11 @@ void Optics::UseScale() {
                         static_cast<float>(height) / static_cast<float>(height_));
   circle_radius_->set(scope_.circle_radius * share.y());
   picture_centre_->set(osg::Vec2(scope_.picture_centre.x() * share.x(), scope_.picture_centre.y() * share.y()));
-  texture_scale_->set(share);
+  const osg::Vec2 texel(1.0f / static_cast<float>(Texels(width_)), 1.0f / static_cast<float>(Texels(height_)));
+  const osg::Vec2 used(static_cast<float>(width) * texel.x(), static_cast<float>(height) * texel.y());
+  texture_scale_->set(used);
   // Texels beyond this hold an older picture of another resolution.
-  texture_most_->set(share - osg::Vec2(0.5f / static_cast<float>(width_), 0.5f / static_cast<float>(height_)));
+  texture_most_->set(used - texel * 0.5f);
   BackgroundChanged();
 }
 

@@ -18,8 +18,10 @@ class Optics {
 
   /// Replaces the textures by those of another size. `scope` is that of the new picture.
   void SetSize(const Laparoscope& scope, int width, int height);
-  /// Resolution of the scene as a share of width and height, in (0, 1].
+  /// Resolution of the scene as a share of width and height, in (0, most].
   void SetScale(float scale);
+  /// Largest scale, 1 at first: the textures have as many pixels.
+  void SetMostScale(float most);
   /// Moves the camera; the size of the picture does not change.
   void SetScope(const Laparoscope& scope);
   /// 0: clear lens … 1: nothing to be seen (services/base/core/lens.h).
@@ -38,11 +40,13 @@ class Optics {
   void BackgroundChanged();
   void AddField();
   void UseScale();
+  void ResizeTextures();
+  [[nodiscard]] int Texels(int pixels) const;
 
   Laparoscope scope_;
   int width_;
   int height_;
-  float scale_ = 1;
+  float scale_ = 1, most_ = 1;
   osg::ref_ptr<osg::Group> node_;
   osg::ref_ptr<osg::Uniform> circle_radius_, picture_centre_, texture_scale_, texture_most_, soil_;
   osg::ref_ptr<osg::Program> clear_lens_, soiled_lens_;

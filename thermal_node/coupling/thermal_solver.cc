@@ -161,6 +161,7 @@ void ThermalSolver::PaperFrame(std::span<const TipInput> tips, float dt_s) {
   if (tip.active) AddPath(tip.path, tip.mode);
   if (tip.active) paper_->Heat(&field_, {tip.path.from, tip.path.radius_m, voltage, tip.path.tented}, dt_s, &ledger_);
   figures_.substeps = field_.Diffuse(dt_s, &ledger_);
+  paper_->CoolBorder(&field_, dt_s, &ledger_);
   StageTears();
   torn_ = {};
   const RemovedBox removed = paper_->RemoveNodes(&field_, &topology_, &ledger_);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "thermal_node/heat/wide.h"
 
@@ -33,11 +34,22 @@ Material MakePaperMaterial(const ThermalParams& params) {
   m.theta_boil = kThetaPlausible;  // never reached: no latent heat
   m.sigma_per_K = 0;
   m.leak_S_m2 = 0;
+  if (params.as == PaperForm::kPrinted) {
+    m.rc_wet = m.rc_dry = 1e6f * kPrintedDensity_g_cm3 * kPrintedHeatCapacity_J_gK;
+    m.k_wet = m.k_dry = kPrintedConductivity_W_mK;
+    m.sigma = kPrintedSigma_S_m;
+    m.loss_resting = m.loss_tented = 0;
+  }
   return m;
 }
 
 PaperModel::PaperModel(const SheetScene& scene, const Sheet& sheet)
-    : rows_(scene.membrane.rows), cols_(scene.membrane.cols), nx_(sheet.nx), ny_(sheet.ny) {
+    : as_(scene.thermal.as),
+      h_border_W_m2K_(scene.thermal.h_top_W_m2K),
+      rows_(scene.membrane.rows),
+      cols_(scene.membrane.cols),
+      nx_(sheet.nx),
+      ny_(sheet.ny) {
   const Vec2f origin(static_cast<float>(sheet.origin_x), static_cast<float>(sheet.origin_y));
   node_.reserve(scene.membrane_material.size());
   for (const Vec2f& p : scene.membrane_material) node_.push_back(p / sheet.cell_m - origin);
@@ -53,6 +65,37 @@ PaperModel::PaperModel(const SheetScene& scene, const Sheet& sheet)
   std::vector<Index> next(bin_offset_.begin(), bin_offset_.end() - 1);
   for (Index n = 0; n < nodes; ++n) bin_node_[next[tile_of(n)]++] = n;
   invalid_.reserve(1024);
+  if (as_ == PaperForm::kPrinted) FindBorder(sheet);
+}
+
+void PaperModel::FindBorder(const Sheet& sheet) {
+  const auto outside = [&](int ix, int iy) { return !sheet.Contains({ix, iy}) || sheet.IsOutside(ix, iy); };
+  border_.resize(sheet.tile_count());
+  for (int iy = 0; iy < ny_; ++iy) {
+    for (int ix = 0; ix < nx_; ++ix) {
+      if (outside(ix, iy)) continue;
+      int faces = 0;
+      for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) faces += outside(ix + dx, iy + dy);
+      if (faces == 0) continue;
+      border_[iy / kTile * sheet.tiles_x + ix / kTile].push_back({(iy % kTile) * kTile + ix % kTile, faces});
+    }
+  }
+}
+
+void PaperModel::CoolBorder(HeatField* field, float dt_s, Ledger* ledger) const {
+  if (border_.empty()) return;
+  const Material& material = field->material();
+  const float rate = h_border_W_m2K_ / (material.rc_wet * material.cell_m);  // Of a cell with one face outside [1/s].
+  for (Tile* tile : field->awake()) {
+    const std::vector<BorderCell>& cells = border_[tile->index];
+    if (cells.empty()) continue;
+    const double before = tile->Heat();
+    for (const auto& [cell, faces] : cells) {
+      tile->state.enthalpy[cell] *= std::exp(-rate * static_cast<float>(faces) * dt_s);
+    }
+    ledger->lost += before - tile->Heat();
+    field->RefreshTheta(tile, ledger);
+  }
 }
 
 CellIndex PaperModel::CellOfNode(Index node) const {
@@ -79,7 +122,7 @@ void PaperModel::LoadTissue(const HeatField& field) {
       const Tile* tile = beyond ? nullptr : field.Find(ix / kTile, iy / kTile);
       for (int n = 0; n < kTile; ++n) {
         bool tissue = !beyond;
-        if (tile != nullptr) {
+        if (tile != nullptr && as_ == PaperForm::kCorrected) {
           tissue = (tile->state.flags[(iy % kTile) * kTile + n] & kNoTissue) == 0;
         } else if (tissue) {
           tissue = !sheet.IsOutside(ix + n, iy);
@@ -201,9 +244,18 @@ RemovedBox PaperModel::RemoveNodes(HeatField* field, MeshTopology* topology, Led
     }
   }
   RemovedBox removed;
+  const auto is_invalid = [&](Index node) {
+    const CellIndex at = CellOfNode(node);
+    const Tile* tile = field->Find(at.ix / kTile, at.iy / kTile);
+    return tile != nullptr && (tile->state.flags[(at.iy % kTile) * kTile + at.ix % kTile] & kRemoved) != 0;
+  };
   for (const Index node : invalid_) {
     TakeOutCellsOf(node, field, ledger, &removed);
-    topology->StageInvalidNode(node);
+    if (as_ == PaperForm::kPrinted) {
+      topology->StageInvalidNode(node, is_invalid);
+    } else {
+      topology->StageInvalidNode(node, [](Index) { return true; });
+    }
   }
   if (!removed.empty()) {
     for (Tile* tile : field->awake()) {

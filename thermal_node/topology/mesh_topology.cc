@@ -87,15 +87,6 @@ std::span<const Index> MeshTopology::EdgesAt(int tile_index) const {
   return std::span(bin_edge_).subspan(bin_offset_[tile_index], bin_offset_[tile_index + 1] - bin_offset_[tile_index]);
 }
 
-template <class Visit>
-void MeshTopology::ForEdgesOfNode(Index node, const Visit& visit) const {
-  const Index row = node / cols_, col = node % cols_;
-  for (Index d = 0; d < 3; ++d) visit(3 * node + d);
-  if (col > 0) visit(3 * (node - 1));
-  if (row > 0) visit(3 * (node - cols_) + 1);
-  if (row > 0 && col > 0) visit(3 * (node - cols_ - 1) + 2);
-}
-
 void MeshTopology::KillEdge(Index edge) {
   if (!EdgeExists(edge) || TestBit(staged_.dead_edges, edge)) return;
   SetBit(staged_.dead_edges, edge);
@@ -226,14 +217,10 @@ void MeshTopology::StageShrink(const HeatField& field, const Tile& tile) {
   }
 }
 
-void MeshTopology::StageInvalidNode(Index node) {
-  ForEdgesOfNode(node, [&](Index edge) {
-    if (!EdgeExists(edge)) return;
-    const float left = kInvalidShrink * (1.0f - kShrinkUnit * static_cast<float>(staged_.shrink[edge]));
-    staged_.shrink[edge] = static_cast<std::uint8_t>(std::min(255L, std::lround((1.0f - left) / kShrinkUnit)));
-    changed_ = true;
-  });
-  KillNode(node);
+void MeshTopology::Shorten(Index edge) {
+  const float left = kInvalidShrink * (1.0f - kShrinkUnit * static_cast<float>(staged_.shrink[edge]));
+  staged_.shrink[edge] = static_cast<std::uint8_t>(std::min(255L, std::lround((1.0f - left) / kShrinkUnit)));
+  changed_ = true;
 }
 
 bool MeshTopology::Commit() {

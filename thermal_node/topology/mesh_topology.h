@@ -54,9 +54,11 @@ class MeshTopology {
   /// Shrink from collagen damage of the edges near the tile: L = L0 (1 - shrink_max (1 - exp(-Omega))), mean over the
   /// cells of the segment. It is always relative to the rest length and never decreases.
   void StageShrink(const HeatField& field, const Tile& tile);
-  /// Applies the paper's rule: the node dies, and the rest length of every edge at it is multiplied by kInvalidShrink,
-  /// once per end that has become invalid. Call once per node.
-  void StageInvalidNode(Index node);
+  /// Applies the paper's rule to a node that has become invalid: the rest length of every edge at it is multiplied by
+  /// kInvalidShrink, once per invalid end, and the edges whose other end is `invalid` as well are deleted; a node
+  /// without an edge is dead. Call once per node.
+  template <class Invalid>
+  void StageInvalidNode(Index node, const Invalid& invalid);
   /// Makes staged changes visible. Returns true if there were any; the revision is then one higher.
   bool Commit();
 
@@ -88,6 +90,7 @@ class MeshTopology {
   [[nodiscard]] bool HasPath(const HeatField& field, Index edge, const StrandRule& rule);
   void KillEdge(Index edge);
   void KillNode(Index node);
+  void Shorten(Index edge);
   void KillIfIsolated(Index node);
   void BuildBins(const Sheet& sheet);
   template <class Visit>
@@ -126,6 +129,29 @@ void ForCellsOnLine(const Sheet& sheet, const Vec2f& p, const Vec2f& q, const Ta
       take(CellIndex{ix, iy});
     }
   }
+}
+
+template <class Visit>
+void MeshTopology::ForEdgesOfNode(Index node, const Visit& visit) const {
+  const Index row = node / cols_, col = node % cols_;
+  for (Index d = 0; d < 3; ++d) visit(3 * node + d);
+  if (col > 0) visit(3 * (node - 1));
+  if (row > 0) visit(3 * (node - cols_) + 1);
+  if (row > 0 && col > 0) visit(3 * (node - cols_ - 1) + 2);
+}
+
+template <class Invalid>
+void MeshTopology::StageInvalidNode(Index node, const Invalid& invalid) {
+  ForEdgesOfNode(node, [&](Index edge) {
+    if (!EdgeExists(edge)) return;
+    Shorten(edge);
+    if (TestBit(staged_.dead_edges, edge)) return;
+    const Index other = edge / 3 == node ? OtherEnd(edge) : edge / 3;
+    if (!invalid(other)) return;
+    KillEdge(edge);
+    KillIfIsolated(other);
+  });
+  KillIfIsolated(node);
 }
 
 template <class Take>

@@ -18,6 +18,10 @@ namespace fulcrum {
 
 enum class PhysicsMode : std::uint32_t { kPaper = 0, kXpbd = 1, kAccurate = 2 };
 
+/// How the paper's equations are taken, in physics and heat: with the corrections that make them usable, or to the
+/// letter, for comparison (deploy/docs/measurements/paper).
+enum class PaperForm : std::uint32_t { kCorrected = 0, kPrinted = 1 };
+
 /// What the membrane of mode accurate is (physics_node/energy/elastic_model.h). The other modes always take springs.
 enum class MembraneModel : std::uint32_t { kSprings = 0, kContinuum = 1 };
 
@@ -28,6 +32,7 @@ enum class PhysicsPreset : std::uint32_t { kFast = 0, kDefault = 1, kAccurate = 
 /// the moduli are SI, are used by the other modes, and determine the forces in all modes.
 struct PhysicsParams {
   PhysicsMode mode = PhysicsMode::kPaper;
+  PaperForm as = PaperForm::kCorrected;  ///< For mode paper; printed: Table 1 replaces dt_s, iterations, damping and k.
   PhysicsPreset preset = PhysicsPreset::kDefault;
   std::uint32_t substeps = 20;  ///< For mode xpbd.
   std::uint32_t iterations = 3;
@@ -65,6 +70,7 @@ enum class ThermalModel : std::uint32_t { kAccurate = 0, kPaper = 1 };
 /// Section `thermal`. Defaults: peritoneum on fat, lab values.
 struct ThermalParams {
   ThermalModel model = ThermalModel::kAccurate;
+  PaperForm as = PaperForm::kCorrected;  ///< For model paper; printed: Table 2 replaces the tissue's properties.
   float cell_m = 1.0e-4f;
   float thickness_m = 3.0e-4f;
   float density_kg_m3 = 1050.0f;

@@ -33,10 +33,22 @@ void ReadInteger(StrictMap* map, const char* key, int min, int max, std::uint32_
   *field = static_cast<std::uint32_t>(map->Integer(key, *field, min, max));
 }
 
+namespace {
+
+void ReadPaperForm(StrictMap* map, bool paper, const char* needs, PaperForm* as) {
+  *as = map->Choice("as", *as, {{"corrected", PaperForm::kCorrected}, {"printed", PaperForm::kPrinted}});
+  if (*as == PaperForm::kPrinted && !paper) {
+    map->Fail("as", needs);
+  }
+}
+
+}  // namespace
+
 void ReadPhysics(StrictMap map, PhysicsParams* p) {
   p->mode =
       map.Choice("mode", p->mode,
                  {{"paper", PhysicsMode::kPaper}, {"xpbd", PhysicsMode::kXpbd}, {"accurate", PhysicsMode::kAccurate}});
+  ReadPaperForm(&map, p->mode == PhysicsMode::kPaper, "printed needs physics.mode paper", &p->as);
   p->preset = map.Choice("preset", p->preset,
                          {{"fast", PhysicsPreset::kFast},
                           {"default", PhysicsPreset::kDefault},
@@ -78,6 +90,7 @@ void ReadPhysics(StrictMap map, PhysicsParams* p) {
 
 void ReadThermal(StrictMap map, ThermalParams* t) {
   t->model = map.Choice("model", t->model, {{"accurate", ThermalModel::kAccurate}, {"paper", ThermalModel::kPaper}});
+  ReadPaperForm(&map, t->model == ThermalModel::kPaper, "printed needs thermal.model paper", &t->as);
   ReadSi(&map, "cell_um", Range::Between(10, 10000), &t->cell_m);
   ReadSi(&map, "thickness_mm", Range::Between(0.01, 10), &t->thickness_m);
   ReadSi(&map, "density_kg_m3", Range::Between(1, 1e5), &t->density_kg_m3);

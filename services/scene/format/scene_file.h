@@ -11,7 +11,7 @@
 
 namespace fulcrum::scene {
 
-inline constexpr std::uint32_t kSceneFileVersion = 10;
+inline constexpr std::uint32_t kSceneFileVersion = 11;
 
 /// Owns the arrays of a scene under construction or in a test; `View()` is what nodes read.
 struct SceneData {

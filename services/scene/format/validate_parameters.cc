@@ -1,4 +1,5 @@
 #include <cstring>
+#include <utility>
 
 #include "services/scene/format/validate_checks.h"
 
@@ -45,6 +46,11 @@ void CheckParameters(const SceneView& s) {
   const HapticsParams& h = s.haptics;
   if (p.mode > PhysicsMode::kAccurate) {
     Fail("scene", "physics.mode = ", static_cast<std::uint32_t>(p.mode), "; valid: 0 (paper), 1 (xpbd), 2 (accurate)");
+  }
+  for (const auto& [key, as] : {std::pair{"physics.as", p.as}, std::pair{"thermal.as", t.as}}) {
+    if (as > PaperForm::kPrinted) {
+      Fail("scene", key, " = ", static_cast<std::uint32_t>(as), "; valid: 0 (corrected), 1 (printed)");
+    }
   }
   if (p.preset > PhysicsPreset::kReference) {
     Fail("scene", "physics.preset = ", static_cast<std::uint32_t>(p.preset), "; valid: 0 (fast) to 3 (reference)");

@@ -8,7 +8,7 @@
 #include "physics_node/contact_model/surface_curvature.h"
 #include "services/scene/builder/build.h"
 #include "tests/benchmark/report.h"
-#include "tests/numerics/physics/script_player.h"
+#include "physics_node/simulation/script_player.h"
 
 namespace fulcrum::physics {
 namespace {

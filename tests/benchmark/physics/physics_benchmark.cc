@@ -5,7 +5,7 @@
 
 #include "services/scene/builder/build.h"
 #include "tests/benchmark/report.h"
-#include "tests/numerics/physics/script_player.h"
+#include "physics_node/simulation/script_player.h"
 
 namespace fulcrum::physics {
 namespace {

@@ -14,6 +14,7 @@
 #include "render_node/geometry/atlas.h"
 #include "render_node/geometry/quality.h"
 #include "render_node/geometry/surface.h"
+#include "render_node/geometry/texel.h"
 #include "render_node/node/render_node.h"
 #include "render_node/offscreen/egl_context.h"
 #include "render_node/scene_graph/atlas_texture.h"
@@ -71,10 +72,11 @@ void FullScene(const SceneView& scene, std::uint32_t width, std::uint32_t height
   std::printf("# %s\n", display->description().c_str());
   const SyntheticMoment moment = MakeSyntheticMoment(view, 12.0);
   Show(moment, &laparoscope);
-  QualityControl quality(Quality::kAuto, static_cast<int>(view.render.height));
+  QualityControl quality(Quality::kAuto, static_cast<int>(view.render.height), display->is_gpu());
+  laparoscope.SetMostScale(quality.most());
   std::vector<float> xyz;
   std::vector<double> frame_ms, cpu_side_ms;
-  const int repeats = report->quick() ? 20 : 100, settling = 60;
+  const int repeats = report->quick() ? 20 : 100, settling = 200;
   for (int k = 0; k < settling + repeats; ++k) {
     Sway(moment.tissue.xyz, k, &xyz);
     const double start = CpuMs(CLOCK_MONOTONIC);
@@ -94,7 +96,8 @@ void FullScene(const SceneView& scene, std::uint32_t width, std::uint32_t height
   report->Add(prefix + "frame_ms_p95", benchmark::Quantile(frame_ms, 0.95), "ms");
   report->Add(prefix + "cpu_side_ms_p50", benchmark::Quantile(cpu_side_ms, 0.5), "ms");
   report->Add(prefix + "scale", quality.scale(), "1");
-  for (const auto& [name, scale] : {std::pair{"high", 1.0f}, {"low", 0.52f}}) {
+  for (const auto& [name, scale] : {std::pair{"smooth", 2.0f}, {"high", 1.0f}, {"low", 0.52f}}) {
+    if (scale > quality.most()) continue;
     laparoscope.SetScale(scale);
     int step = 0;
     const auto times = benchmark::TimeMs(3, repeats / 2, [&] {
@@ -104,6 +107,69 @@ void FullScene(const SceneView& scene, std::uint32_t width, std::uint32_t height
       display->Draw();
     });
     report->Add(prefix + name + "_frame_ms_p50", benchmark::Quantile(times, 0.5), "ms");
+  }
+}
+
+/// Mean over blocks of n x n pixels.
+Bitmap Mean(const Bitmap& fine, int n) {
+  Bitmap mean{fine.width / n, fine.height / n, {}};
+  for (int y = 0; y < mean.height; ++y) {
+    for (int x = 0; x < mean.width; ++x) {
+      for (int channel = 0; channel < 3; ++channel) {
+        int sum = 0;
+        for (int k = 0; k < n * n; ++k)
+          sum += fine.rgb[3 * TexelIndex(n * x + k % n, n * y + k / n, fine.width) + channel];
+        mean.rgb.push_back(static_cast<std::uint8_t>(sum / (n * n)));
+      }
+    }
+  }
+  return mean;
+}
+
+/// Mean difference [of 255] from a picture of four by four samples a pixel, over its edges: the pixels that differ from
+/// a neighbour by more than kEdge.
+void Edges(const SceneView& scene, benchmark::Report* report) {
+  if (!report->Wants("render.edge_error")) return;
+  constexpr int kSamples = 4, kEdge = 24;
+  const SyntheticMoment moment = MakeSyntheticMoment(scene, 12.0);
+  const auto draw = [&](int size, float scale) {
+    SceneView view = scene;
+    view.render.width *= static_cast<std::uint32_t>(size);
+    view.render.height *= static_cast<std::uint32_t>(size);
+    LaparoscopeView laparoscope(view);
+    laparoscope.SetMostScale(std::max(1.0f, scale));
+    laparoscope.SetScale(scale);
+    const auto display = MakeOffscreenDisplay(laparoscope, view.render);
+    Show(moment, &laparoscope);
+    laparoscope.Update();
+    Bitmap picture;
+    display->DrawAndRead(&picture);
+    return picture;
+  };
+  const Bitmap reference = Mean(draw(kSamples, 1), kSamples);
+  const auto at = [&](int x, int y) { return 3 * TexelIndex(x, y, reference.width); };
+  std::vector<std::size_t> edges;
+  for (int y = 1; y + 1 < reference.height; ++y) {
+    for (int x = 1; x + 1 < reference.width; ++x) {
+      int most = 0;
+      for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+        for (std::size_t channel = 0; channel < 3; ++channel) {
+          most = std::max(most, std::abs(int{reference.rgb[at(x, y) + channel]} -
+                                         int{reference.rgb[at(x + dx, y + dy) + channel]}));
+        }
+      }
+      if (most > kEdge) edges.push_back(at(x, y));
+    }
+  }
+  for (const auto& [name, scale] : {std::pair{"low", 0.52f}, {"high", 1.0f}, {"smooth", 2.0f}}) {
+    const Bitmap picture = draw(1, scale);
+    double sum = 0;
+    for (const std::size_t edge : edges) {
+      for (std::size_t channel = 0; channel < 3; ++channel) {
+        sum += std::abs(int{picture.rgb[edge + channel]} - int{reference.rgb[edge + channel]});
+      }
+    }
+    report->Add(std::string("render.edge_error.") + name, sum / (3.0 * static_cast<double>(edges.size())), "1/255");
   }
 }
 
@@ -258,6 +324,7 @@ int main(int argc, char** argv) {
     const SceneView view = data.View();
     render::FullScene(view, 1280, 720, &report);
     render::FullScene(view, 1920, 1080, &report);
+    render::Edges(view, &report);
     render::Uploads(view, &report);
     render::Embedding(view, &report);
     render::StaticScene(view, &report);

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "services/scene/builder/build.h"
-#include "tests/numerics/physics/script_player.h"
+#include "physics_node/simulation/script_player.h"
 
 namespace fulcrum::physics {
 namespace {

@@ -4,7 +4,7 @@
 #include <random>
 
 #include "services/scene/builder/build.h"
-#include "tests/numerics/physics/script_player.h"
+#include "physics_node/simulation/script_player.h"
 
 namespace fulcrum::physics {
 namespace {

@@ -8,7 +8,7 @@
 #include "physics_node/node/physics_node.h"
 #include "services/scene/builder/build.h"
 #include "services/transport/bus/in_process.h"
-#include "tests/numerics/physics/script_player.h"
+#include "physics_node/simulation/script_player.h"
 
 namespace fulcrum::physics {
 namespace {

@@ -8,7 +8,7 @@
 #include "physics_node/simulation/tissue_simulation.h"
 #include "services/scene/builder/build.h"
 #include "services/transport/bus/gate.h"
-#include "tests/numerics/physics/script_player.h"
+#include "physics_node/simulation/script_player.h"
 #include "tests/unit/physics/sheet_scene.h"
 
 namespace fulcrum::physics {

@@ -9,7 +9,7 @@
 
 #include "physics_node/simulation/tissue_simulation.h"
 #include "services/scene/builder/build.h"
-#include "tests/numerics/physics/script_player.h"
+#include "physics_node/simulation/script_player.h"
 
 namespace fulcrum::physics {
 namespace {

@@ -168,6 +168,25 @@ TEST(QualityTest, NeverGoesBelowLegible) {
   }
 }
 
+/// On a GPU: two by two samples a pixel while a picture takes at most 12 ms.
+TEST(QualityTest, SmoothsWhereThereIsTime) {
+  QualityControl quality(Quality::kAuto, 1080, true);
+  quality.Add(50);
+  EXPECT_EQ(quality.scale(), 1.0f);
+  for (int k = 0; k < 200; ++k) quality.Add(1 + 2 * quality.scale() * quality.scale());
+  EXPECT_EQ(quality.scale(), 2.0f);
+  for (int k = 0; k < 400; ++k) {
+    quality.Add(2 + 5 * quality.scale() * quality.scale());
+    EXPECT_LE(quality.scale(), 2.0f);
+  }
+  EXPECT_EQ(quality.scale(), 1.41f);
+  for (int k = 0; k < 200; ++k) quality.Add(13);
+  EXPECT_EQ(quality.scale(), 1.0f) << "above 12 ms and below 28";
+  EXPECT_EQ(QualityControl(Quality::kHigh, 1080, true).scale(), 2.0f);
+  quality.SetHeight(2160);
+  EXPECT_EQ(quality.most(), 1.0f) << "the textures would be too large";
+}
+
 TEST(QualityTest, ALargerPictureBeginsWithTheLinesOfTheLastAndASmallerOneWithAllOfIts) {
   QualityControl quality(Quality::kAuto, 540);
   for (int k = 0; k < 20; ++k) quality.Add(20);
