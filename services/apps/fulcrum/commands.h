@@ -34,6 +34,8 @@ ExitCode Console(const Words& words);
 ExitCode Reference(const Words& words);
 ExitCode Assess(const Words& words);
 ExitCode Trainee(const Words& words);
+ExitCode Questionnaire(const Words& words);
+ExitCode Profile(const Words& words);
 ExitCode Help(const Words& words);
 ExitCode Version(const Words& words);
 

@@ -23,7 +23,7 @@ ExitCode TestNode(const Words& words) {
       ("assert", po::value<std::vector<std::string>>()->value_name("EXPR"),
        "FIGURE < | <= | == | != | >= | > NUMBER, for example \"cut_length_mm > 30\", over the figures of the node's "
        "Health (NAME: the last value, NAME.min and NAME.max of the session) and ticks, compared, hash_mismatches, "
-       "starts, session_s, busy_s; may be repeated")                                                 //
+       "starts, session_s, busy_s, step_p50_ms, step_p99_ms; may be repeated")                       //
       ("junit", po::value<std::string>()->value_name("FILE"), "also write the result as JUnit XML")  //
       ("scene", po::value<std::string>()->value_name("FILE"),
        "compiled scene (default: scene.fulcrum beside the log)")  //

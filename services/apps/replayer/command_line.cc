@@ -62,7 +62,8 @@ void AddOptions(po::options_description* options) {
        "test: expected state hash after the last tick, 16 hexadecimal digits")  //
       ("assert", po::value<std::vector<std::string>>()->value_name("EXPR"),
        "test: FIGURE < | <= | == | != | >= | > NUMBER, over the figures of the node's Health (also as NAME.min and "
-       "NAME.max of the session) and ticks, compared, hash_mismatches, starts, session_s, busy_s; may be repeated")  //
+       "NAME.max of the session) and ticks, compared, hash_mismatches, starts, session_s, busy_s, step_p50_ms, "
+       "step_p99_ms; may be repeated")  //
       ("junit", po::value<std::string>()->value_name("FILE")->default_value(""),
        "test: also write the result as JUnit XML")  //
       ("set", po::value<std::vector<std::string>>()->value_name("SECTION.KEY=VALUE"),

@@ -16,13 +16,14 @@
 #include "services/apps/replayer/session_facts.h"
 #include "services/apps/replayer/tick_source.h"
 #include "services/base/runtime/cyclic_thread.h"
+#include "services/base/runtime/histogram.h"
 #include "services/records/recording/mcap_reader.h"
 #include "services/transport/bus/topics.h"
 
 namespace fulcrum::replay {
 namespace {
 
-constexpr double kNsToS = 1e-9;
+constexpr double kNsToS = 1e-9, kNsToMs = 1e-6;
 
 /// A node that computes its ticks on its own thread. When at least as many nodes compute (`at_work`) as there are
 /// cores, no node uses further threads.
@@ -75,6 +76,9 @@ class NodeRunner {
       if (!Make(tick)) break;
     }
     --at_work_;
+    const runtime::HistogramSnapshot step = step_.snapshot();
+    result_.step_p50_ms = kNsToMs * static_cast<double>(step.Quantile(0.5));
+    result_.step_p99_ms = kNsToMs * static_cast<double>(step.Quantile(0.99));
     if (result_.ticks > 0 && result_.missing.empty()) LookAtHealth(next_look_ns_);
     const std::lock_guard lock(mutex_);
     stopped_ = true;
@@ -111,7 +115,9 @@ class NodeRunner {
       result_.missing = error.what();
       return false;
     }
-    result_.busy_s += kNsToS * static_cast<double>(runtime::MonotonicNs() - begin);
+    const std::int64_t took_ns = runtime::MonotonicNs() - begin;
+    step_.Add(took_ns);
+    result_.busy_s += kNsToS * static_cast<double>(took_ns);
     ++result_.ticks;
     result_.starts += tick.epoch != epoch_ ? 1 : 0;
     epoch_ = tick.epoch;
@@ -145,6 +151,7 @@ class NodeRunner {
 
   std::unique_ptr<ReplayedNode> node_;
   NodeResult result_;
+  runtime::Histogram step_;
   std::vector<Published> outputs_;
   const bool go_on_;
   const int further_threads_;

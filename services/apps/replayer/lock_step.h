@@ -44,14 +44,15 @@ struct HealthFigure {
 
 struct NodeResult {
   NodeId node = NodeId::kPhysics;
-  std::uint64_t ticks = 0;             ///< Computed ticks.
-  std::uint64_t compared = 0;          ///< Ticks whose state hash is recorded.
-  std::uint64_t starts = 0;            ///< 1 plus the restarts of the node.
-  double session_time_s = 0;           ///< Session time of its last tick [s].
-  double busy_s = 0;                   ///< Time spent computing [s].
-  std::uint64_t state_hash = 0;        ///< State hash after its last tick.
-  std::uint64_t mismatches = 0;        ///< Compared ticks with a different hash.
-  std::optional<Departure> departure;  ///< First difference.
+  std::uint64_t ticks = 0;                  ///< Computed ticks.
+  std::uint64_t compared = 0;               ///< Ticks whose state hash is recorded.
+  std::uint64_t starts = 0;                 ///< 1 plus the restarts of the node.
+  double session_time_s = 0;                ///< Session time of its last tick [s].
+  double busy_s = 0;                        ///< Time spent computing [s].
+  double step_p50_ms = 0, step_p99_ms = 0;  ///< Of the ticks [ms].
+  std::uint64_t state_hash = 0;             ///< State hash after its last tick.
+  std::uint64_t mismatches = 0;             ///< Compared ticks with a different hash.
+  std::optional<Departure> departure;       ///< First difference.
   std::map<std::string, HealthFigure> health;
   std::string missing;  ///< Data that the recording lacks to continue; empty: none.
   [[nodiscard]] bool good() const { return !departure && missing.empty() && compared > 0; }

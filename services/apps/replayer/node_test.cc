@@ -26,6 +26,8 @@ void AddFigures(const NodeResult& node, double session_s, std::map<std::string, 
   (*figures)["starts"] = static_cast<double>(node.starts);
   (*figures)["session_s"] = session_s;
   (*figures)["busy_s"] = node.busy_s;
+  (*figures)["step_p50_ms"] = node.step_p50_ms;
+  (*figures)["step_p99_ms"] = node.step_p99_ms;
 }
 
 std::string Names(const std::map<std::string, double>& figures) {

@@ -46,8 +46,8 @@ struct NodeTestResult {
 
 /// Replays `settings.nodes`, which is one node, in lock step to the end and checks the demands. Figures are those of
 /// its Health (the last value; `.min` and `.max` of the whole session) and of the replay: ticks, compared,
-/// hash_mismatches, starts, session_s, busy_s. Throws like ReplayInLockStep, and InputError when an assertion names no
-/// figure of the node.
+/// hash_mismatches, starts, session_s, busy_s, step_p50_ms, step_p99_ms. Throws like ReplayInLockStep, and InputError
+/// when an assertion names no figure of the node.
 [[nodiscard]] NodeTestResult TestNode(const LockStepSettings& settings, const Demands& demands, const SceneView& scene,
                                       const config::CartConfig& cart, const std::function<void(double)>& progress);
 

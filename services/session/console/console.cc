@@ -24,6 +24,7 @@
 #include "services/session/console/library.h"
 #include "services/session/console/live_state.h"
 #include "services/session/console/live_view.h"
+#include "services/session/console/opinion.h"
 #include "services/session/console/page.h"
 #include "services/session/console/picture_watch.h"
 #include "services/session/console/router.h"
@@ -31,6 +32,7 @@
 #include "services/session/console/session_watch.h"
 #include "services/session/console/training_calls.h"
 #include "services/session/supervisor/ask.h"
+#include "services/session/training/questionnaire.h"
 
 namespace fulcrum::console {
 namespace {
@@ -203,6 +205,12 @@ struct Console::Impl {
       case Wanted::kEnter:
       case Wanted::kCancel:
         return LeadTask(routed.wanted);
+      case Wanted::kQuestions:
+        return {.body = QuestionsJson(settings.out)};
+      case Wanted::kAnswers:
+        if (session.empty() || watch.alive()) return Refusal(409, "the questionnaire is for a session that has ended");
+        training::WriteAnswers(SessionFile(""), training::ParseAnswers(TextIn(routed.fields, "answers")));
+        return Done("Stored. Thank you.");
       case Wanted::kClose:
         if (task && task->running()) return Refusal(409, "the task still runs; wait for its end or cancel it");
         task.reset();

@@ -57,6 +57,8 @@ constexpr Field kPinField{"pin", true, IsShortText, "4 to 12 digits"};
 constexpr std::array kAccountFields{kNameField, kPinField};
 constexpr std::array kNewAccountFields{kNameField, kPinField, Field{"instructor", false, IsOnOff, "on, off"}};
 constexpr std::array kAttemptFields{Field{"session", true, IsPlainName, "a session that /api/training lists"}};
+constexpr std::array kAnswersFields{
+    Field{"answers", true, IsShortText, "twelve numbers from 0 to 5 with commas between"}};
 constexpr std::array kNodeFields{Field{"node", true, IsNode, "a node's name, for example physics_node"}};
 constexpr std::array kGeneratorFields{Field{"cut", false, IsKnob, "0 to 300 W"},
                                       Field{"coag", false, IsKnob, "0 to 300 W"},
@@ -87,6 +89,8 @@ constexpr std::array kEntries{
     Entry{"/api/training/leave", true, Wanted::kTrainingLeave, {}},
     Entry{"/api/attempt", false, Wanted::kAttempt, kAttemptFields},
     Entry{"/api/attempt/events", false, Wanted::kAttemptEvents, kAttemptFields},
+    Entry{"/api/questionnaire", false, Wanted::kQuestions, {}},
+    Entry{"/api/questionnaire/answers", true, Wanted::kAnswers, kAnswersFields},
     Entry{"/api/start", true, Wanted::kStart, kStartFields},
     Entry{"/api/stop", true, Wanted::kStop, {}},
     Entry{"/api/restart", true, Wanted::kRestart, kNodeFields},

@@ -40,6 +40,8 @@ enum class Wanted {
   kTrainingLeave,
   kAttempt,        ///< Sheet of an attempt. Field: session.
   kAttemptEvents,  ///< What happened when. Field: session.
+  kQuestions,      ///< The questionnaire and the answers of all sessions.
+  kAnswers,        ///< Stores the answers for the last session. Field: answers.
   kClose,          ///< Removes the ended task from the page.
 };
 

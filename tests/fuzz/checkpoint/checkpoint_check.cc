@@ -6,7 +6,7 @@
 #include "physics_node/node/physics_checkpoint.h"
 #include "services/scene/builder/build.h"
 #include "services/transport/bus/gate.h"
-#include "tests/numerics/physics/script_player.h"
+#include "physics_node/simulation/script_player.h"
 #include "tests/numerics/thermal/flat_scene.h"
 #include "thermal_node/coupling/thermal_solver.h"
 

@@ -180,6 +180,8 @@ TEST(Router, FieldsAreCheckedByTheTable) {
                           "scene=a&seconds=-1", "scene=a&record=yes", "scene=a&more=1", "scene=a&picture_rate=1000"}) {
     EXPECT_EQ(StatusOf(Post("/api/start", bad)), 400) << bad;
   }
+  EXPECT_EQ(StatusOf(Post("/api/questionnaire/answers", "answers=0,1,2,3,4,5,0,1,2,3,4,5")), 200);
+  EXPECT_EQ(StatusOf(Post("/api/questionnaire/answers")), 400);
   EXPECT_EQ(StatusOf(Post("/api/restart", "node=physics_node")), 200);
   EXPECT_EQ(StatusOf(Post("/api/restart", "node=supervisor")), 400);
   EXPECT_EQ(StatusOf(Post("/api/calibrate", "what=handle&tool=2")), 400);

@@ -379,7 +379,7 @@ async function showEnd(before) {
   ended = key;
   if (state.ended) training.ended();
   $('result').hidden = !state.ended && !state.has_report;
-  $('report').hidden = !state.has_report;
+  $('report').hidden = $('questionnaire').hidden = !state.has_report;
   const word = $('result-word');
   word.className = !state.ended ? 'level-off' : state.ended.well ? 'level-good' : 'level-bad';
   setText(word, state.ended ? state.ended.text : state.session);

@@ -1,5 +1,5 @@
 // The page as an operator uses it: check.mjs FULCRUM CHROMIUM FOLDER. Leaves screenshots in FOLDER.
-import {realpathSync} from 'node:fs';
+import {readFileSync, realpathSync} from 'node:fs';
 import {join} from 'node:path';
 import {allRun, expect, look, pictureShown, pidOf, sizes, until, withConsole} from './console.mjs';
 import {axe, faultsOf} from './contrast.mjs';
@@ -64,6 +64,21 @@ await withConsole(fulcrum, browser, 65, async ({address, newPage, trouble, out})
   await page.frameLocator('#report-frame').locator('h1, h2').first().waitFor({timeout: 20_000});
   await page.screenshot({path: join(folder, 'report-1920.png')});
   await page.click('#report-close');
+
+  await page.click('#questionnaire');
+  await page.waitForSelector('#questionnaire-box[open] fieldset');
+  expect(await page.locator('#questions fieldset').count() === 12, 'the twelve questions of the paper');
+  expect((await page.textContent('#opinions-people')).includes('No session'), 'no answers yet');
+  await look(page, 'questionnaire', folder);
+  for (let number = 0; number < 12; ++number) await page.locator(`#questions input[name=question${number}][value="${number % 6}"]`).check({force: true});
+  await page.click('#questionnaire-form button[type=submit]');
+  await page.waitForSelector('#questionnaire-box:not([open])', {state: 'attached'});
+  const answers = readFileSync(join(realpathSync(join(out, 'latest')), 'questionnaire.json'), 'utf8');
+  expect(answers === '{"answers": [0, 1, 2, 3, 4, 5, 0, 1, 2, 3, 4, 5]}\n', `the answers are stored, but ${answers}`);
+  await page.click('#questionnaire');
+  await until(page, 5, () => document.querySelector('#opinions tr:nth-child(6) td:nth-child(2)').textContent.startsWith('5.0'));
+  await page.click('#questionnaire-close');
+
   // Within the page no script may look at it.
   const report = await (await page.context().browser().newContext({viewport: sizes[0]})).newPage();
   await report.addInitScript({content: axe});

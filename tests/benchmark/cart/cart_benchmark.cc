@@ -1,0 +1,165 @@
+// The whole cart at work, as a user runs it: five nodes and the recorder over DDS on this machine, the built-in scene
+// with its script of traction and cutting. Then the same ticks again, each node alone and without other processes: what
+// the session adds to a step.
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <thread>
+
+#include "services/apps/replayer/node_test.h"
+#include "services/base/config/cart.h"
+#include "services/records/log_tools/recording.h"
+#include "services/scene/format/scene_file.h"
+#include "tests/benchmark/report.h"
+#include "tests/support/cart.h"
+
+namespace fulcrum {
+namespace {
+
+namespace fs = std::filesystem;
+using benchmark::Report;
+
+constexpr int kDomain = 89;
+constexpr double kPatience_s = 60;
+
+/// Processor time of a process [s]; 0 when it has ended.
+double CpuSeconds(pid_t pid) {
+  std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
+  std::string text((std::istreambuf_iterator<char>(stat)), {});
+  const std::size_t name_end = text.rfind(')');
+  if (name_end == std::string::npos) return 0;
+  std::istringstream fields(text.substr(name_end + 2));
+  std::string skipped;
+  for (int i = 0; i < 11; ++i) fields >> skipped;
+  double user = 0, system = 0;
+  fields >> user >> system;
+  return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
+}
+
+double CpuSeconds(const testing::Cart& cart) {
+  double sum = CpuSeconds(cart.pid());
+  for (const auto& [name, pid] : testing::ChildrenOf(cart.pid())) sum += CpuSeconds(pid);
+  return sum;
+}
+
+/// The share of one core that the cart takes for some seconds [%].
+double CpuPct(const testing::Cart& cart, double seconds) {
+  const double before = CpuSeconds(cart);
+  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+  return 100 * (CpuSeconds(cart) - before) / seconds;
+}
+
+/// The last value of a metric in a node's recorded Health.
+std::optional<double> LastMetric(const fs::path& recording, NodeId node, const std::string& name) {
+  std::optional<double> last;
+  log_tools::Recording file(recording, {.topics = {"Health"}});
+  log_tools::Entry entry;
+  while (file.Next(&entry)) {
+    (void)log_tools::WithDecoded(*entry.source->topic, entry.message.data, [&]<class T>(const T& message) {
+      if constexpr (std::is_same_v<T, Health>) {
+        if (message.node != node) return;
+        for (const Metric& metric : message.metrics) {
+          if (metric.name == name) last = metric.value;
+        }
+      }
+    });
+  }
+  return last;
+}
+
+struct Step {
+  double p50_ms = 0, p99_ms = 0;
+};
+
+/// The recorded ticks of a node again, alone in this process, on one thread as in the session.
+Step StepAlone(const fs::path& session, NodeId node) {
+  const fs::path folder = fs::temp_directory_path() / ("bench_cart." + std::to_string(::getpid()));
+  fs::create_directories(folder);
+  replay::LockStepSettings settings;
+  settings.recording = session / "recording.mcap";
+  settings.nodes = {node};
+  settings.folder = folder;
+  const scene::SceneFile scene(session / "scene.fulcrum");
+  const config::CartConfig cart = config::LoadCart(session / "cart.yaml");
+  const replay::NodeTestResult result = replay::TestNode(settings, {}, scene.view(), cart, [](double) {});
+  fs::remove_all(folder);
+  return {result.figures.at("step_p50_ms"), result.figures.at("step_p99_ms")};
+}
+
+bool Work(Report* report) {
+  const int seconds = report->quick() ? 12 : 20;
+  testing::Cart cart("built-in", kDomain, {"--record", "--seconds", std::to_string(seconds)});
+  // The pull and the cut: from 4 s on everything works.
+  if (!testing::WaitFor(kPatience_s, [&] { return cart.PictureTime() > 4; })) return false;
+  report->Add("cart.cpu_pct", CpuPct(cart, 6), "%");
+  const std::optional<int> code = cart.WaitForEnd(kPatience_s);
+  if (!code) return false;
+  // A node that was late makes the session end badly, and is a figure here.
+  if (*code != 0) std::fprintf(stderr, "bench_cart: %s\n", cart.Said().c_str());
+  const fs::path session = cart.session();
+  const std::string summary = testing::ReadFile(session / "summary.json");
+  const double session_s = testing::FigureOf(summary, "session_seconds");
+  for (const auto& [node, key] : {std::pair{NodeId::kPhysics, "physics"},
+                                  {NodeId::kThermal, "thermal"},
+                                  {NodeId::kHaptics, "haptics"},
+                                  {NodeId::kRender, "render"}}) {
+    const std::string from = std::string(NodeName(node)) + ".", stem = std::string("cart.") + key + ".";
+    const Step live{testing::FigureOf(summary, from + "step_p50_ms"), testing::FigureOf(summary, from + "step_p99_ms")};
+    report->Add(stem + "step_ms_p50", live.p50_ms, "ms");
+    report->Add(stem + "step_ms_p99", live.p99_ms, "ms");
+    const double ticks = testing::FigureOf(summary, from + "ticks");
+    report->Add(stem + "missed_pct", 100 * testing::FigureOf(summary, from + "overruns") / ticks, "%");
+    if (node != NodeId::kPhysics && node != NodeId::kThermal) continue;
+    const Step alone = StepAlone(session, node);
+    report->Add(stem + "alone_step_ms_p50", alone.p50_ms, "ms");
+    report->Add(stem + "alone_step_ms_p99", alone.p99_ms, "ms");
+    report->Add(stem + "bench_to_live_ratio", live.p50_ms / alone.p50_ms, "1");
+  }
+  const fs::path recording = session / "recording.mcap";
+  if (const auto drawn = LastMetric(recording, NodeId::kRender, "frames_drawn")) {
+    report->Add("cart.pictures_per_s", *drawn / session_s, "1/s");
+  }
+  report->Add("cart.recording_MB_per_s", 1e-6 * static_cast<double>(fs::file_size(recording)) / session_s, "MB/s");
+  return true;
+}
+
+/// Nothing touches the tissue: what the cart takes from the machine while it waits.
+bool Idle(Report* report) {
+  const fs::path yaml = fs::temp_directory_path() / ("bench_cart_idle." + std::to_string(::getpid()) + ".yaml");
+  std::ofstream(yaml) << "name: idle\nbase: " << FULCRUM_SOURCE_DIR << "/deploy/scenes/built-in.yaml\n"
+                      << "script:\n  duration_s: 60\n"
+                      << "  tool0:\n    - {time_s: 0, sheet: [0.3, 0.5], height_mm: 55, jaw_deg: 20}\n"
+                      << "  tool1:\n    - {time_s: 0, sheet: [0.7, 0.5], height_mm: 55}\n";
+  bool well = false;
+  {
+    testing::Cart cart(yaml.string(), kDomain);
+    well = testing::WaitFor(kPatience_s, [&] { return cart.PictureTime() >= 0; });
+    if (well) {
+      std::this_thread::sleep_for(std::chrono::seconds(4));  // The tissue comes to rest.
+      report->Add("cart.idle_cpu_pct", CpuPct(cart, report->quick() ? 5 : 15), "%");
+    }
+  }
+  fs::remove(yaml);
+  return well;
+}
+
+}  // namespace
+}  // namespace fulcrum
+
+int main(int argc, char** argv) {
+  fulcrum::benchmark::Report report(argc, argv);
+  const bool idle = report.Wants("cart.idle_cpu_pct"), work = report.Wants("cart.");
+  if ((idle && !fulcrum::Idle(&report)) || (work && !fulcrum::Work(&report))) {
+    std::fprintf(stderr, "bench_cart: the session did not begin or end\n");
+    return 1;
+  }
+  return 0;
+}
