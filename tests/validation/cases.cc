@@ -9,6 +9,7 @@
 #include "tests/numerics/thermal/mesentery.h"
 #include "tests/numerics/thermal/moving_gaussian.h"
 #include "tests/numerics/thermal/potential_rings.h"
+#include "tests/numerics/thermal/published.h"
 #include "tests/validation/solid_cases.h"
 #include "tests/validation/validation.h"
 
@@ -104,6 +105,27 @@ Quantities Mesentery(Mesh mesh) {
   return {{"spread.mesentery", thermal::RiseAtOneMillimetre({.cell_m = HeatCell(mesh)})}};
 }
 
+Quantities Peritoneum(Mesh mesh) { return {{"spread.peritoneum", 1e3 * thermal::LateralDamage(HeatCell(mesh))}}; }
+
+Quantities Spread(Mesh mesh) { return {{"spread.45_degrees", 1e3 * thermal::SpreadOf45Degrees(HeatCell(mesh))}}; }
+
+Quantities Cooling(Mesh mesh) {
+  return {{"cooling.cut", thermal::CoolingTo60Degrees(CauteryMode::kCut, HeatCell(mesh))},
+          {"cooling.coag", thermal::CoolingTo60Degrees(CauteryMode::kCoag, HeatCell(mesh))}};
+}
+
+/// 1 where the blade does what the publication saw.
+Quantities Regimes(Mesh mesh) {
+  constexpr double kVisible_mm2 = 0.1;
+  const auto is = [mesh](float power_W, bool coagulates, bool cuts) {
+    const thermal::Effect effect = thermal::BladeOnLiver(power_W, HeatCell(mesh));
+    return (effect.coagulated_mm2 > kVisible_mm2) == coagulates && (effect.removed_mm2 > kVisible_mm2) == cuts ? 1.0
+                                                                                                               : 0.0;
+  };
+  return {
+      {"regime.10_W", is(10, false, false)}, {"regime.25_W", is(25, true, false)}, {"regime.50_W", is(50, true, true)}};
+}
+
 }  // namespace
 
 const std::vector<Case>& Cases() {
@@ -129,6 +151,10 @@ const std::vector<Case>& Cases() {
       {"moving-source", "A Gaussian source of heat that moves at 10 mm/s.", MovingSource},
       {"current", "Current between two circles, and from a disc into a sheet on fat.", Current},
       {"mesentery", "A hook of 0.5 mm at 30 W coag for 1 s on tented mesentery: rise 1 mm beside it.", Mesentery},
+      {"peritoneum", "A stroke at 35 W cut: dead tissue beside it.", Peritoneum},
+      {"spread", "A hook at 60 W coag for 1 s: how far 45 degrees reach.", Spread},
+      {"cooling", "After a stroke at 40 W: time until the hottest tissue has cooled to 60 degrees.", Cooling},
+      {"regimes", "A blade at 10, 25 and 50 W through liver: nothing, coagulation, and both it and a cut.", Regimes},
   };
   return kCases;
 }

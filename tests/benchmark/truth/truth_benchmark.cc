@@ -13,6 +13,7 @@
 #include "tests/numerics/thermal/heat_cases.h"
 #include "tests/numerics/thermal/mesentery.h"
 #include "tests/validation/solid_cases.h"
+#include "tests/validation/validation.h"
 
 namespace fulcrum {
 namespace {
@@ -109,6 +110,26 @@ void MeasureSource(benchmark::Report* report) {
   }
 }
 
+/// What others have measured on tissue: quantities, those within their tolerance, and the regimes of a blade on liver.
+void MeasurePublished(benchmark::Report* report) {
+  if (!report->Wants("truth.published.")) return;
+  const validation::Expectations expected = validation::ReadExpectations(FULCRUM_SOURCE_DIR "/deploy/validation");
+  int quantities = 0, within = 0, regimes = 0;
+  for (const validation::Case& one : validation::Cases()) {
+    for (const auto& [quantity, value] : one.run(validation::Mesh::kDefault)) {
+      const validation::Expectation& what = expected.at(quantity);
+      if (what.kind != "published") break;
+      const bool right = std::abs(value / what.value - 1) <= 0.01 * what.tolerance_pct;
+      ++quantities;
+      within += right ? 1 : 0;
+      regimes += right && quantity.starts_with("regime.") ? 1 : 0;
+    }
+  }
+  report->Add("truth.published.quantities", quantities, "1");
+  report->Add("truth.published.within_tolerance_pct", 100.0 * within / quantities, "%");
+  report->Add("truth.published.regimes_right", regimes, "of 3");
+}
+
 }  // namespace
 }  // namespace fulcrum
 
@@ -119,4 +140,5 @@ int main(int argc, char** argv) {
   fulcrum::MeasureSolids(&report);
   fulcrum::MeasureStefan(&report);
   fulcrum::MeasureSource(&report);
+  fulcrum::MeasurePublished(&report);
 }
