@@ -345,7 +345,8 @@ void Elements::WriteForces(float h, const float* place, const float* d, const fl
   }
 }
 
-void Elements::WriteUnbalanced(const float* d, const float* residual, std::span<ContactRow> contacts) {
+void Elements::WriteUnbalanced(const float* d, const float* residual, const Regions& regions,
+                               std::span<ContactRow> contacts) {
   const auto for_particles = [this](const auto& body) {
     for (std::size_t i = 0; i < contacts_.size(); ++i) {
       for (std::size_t k = 0; IsStiff(contacts_[i]) && k < static_cast<std::size_t>(contacts_[i].count); ++k) {
@@ -365,7 +366,8 @@ void Elements::WriteUnbalanced(const float* d, const float* residual, std::span<
   }
   for_particles([&](std::size_t i, ParticleRef at, float weight) {
     ContactRow& row = contacts[contact_row_[i]];
-    if (row_weights_[at.base] > 0.0f) {
+    const bool computed = regions.all_computed() || regions.computed(regions.partition().Of(at));
+    if (computed && row_weights_[at.base] > 0.0f) {
       row.unbalanced_N += weight / row_weights_[at.base] * FieldAt(residual, at);
     }
   });

@@ -112,8 +112,9 @@ class Elements {
   static void WriteForces(float h, const float* place, const float* d, const float* start,
                           std::span<ContactRow> contacts);
   /// Afterwards, for those of the linearisation: the part of these forces that the truncated solve has left unbalanced,
-  /// from its `residual` at `d`. A particle of several rows counts by weight.
-  void WriteUnbalanced(const float* d, const float* residual, std::span<ContactRow> contacts);
+  /// from its `residual` at `d`. A particle of several rows counts by weight; one that is not computed has no residual:
+  /// it was in balance when it fell asleep.
+  void WriteUnbalanced(const float* d, const float* residual, const Regions& regions, std::span<ContactRow> contacts);
   /// Stiffness of a contact in its normal direction [N/m].
   [[nodiscard]] static float ContactStiffness(const ContactRow& row);
   /// Of tissue with tissue, not with a tool.

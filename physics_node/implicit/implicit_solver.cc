@@ -224,7 +224,8 @@ SubstepReport ImplicitSolver::Substep(float h, int iterations, std::span<const H
                         contacts);
   // A correction that was shortened has another residual.
   if (state_.contact_zone.active && !correction.shortened) {
-    state_.elements.WriteUnbalanced(scratch_.krylov.d.data(), state_.linearisation.residual.data(), contacts);
+    state_.elements.WriteUnbalanced(scratch_.krylov.d.data(), state_.linearisation.residual.data(), state_.regions,
+                                    contacts);
   }
   SubstepReport report = Finish(context_, h, &state_, &scratch_);
   state_.regions.UpdateSleep(scratch_.speed, h);

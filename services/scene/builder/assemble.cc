@@ -71,7 +71,7 @@ void CheckCounts(const SceneSettings& settings, const Anatomy& anatomy) {
   if (m.rows < 3 || m.cols < 3 || anatomy.sheet.size() != static_cast<std::size_t>(m.rows) * m.cols) {
     Refuse(settings, "the membrane needs at least 3 x 3 nodes");
   }
-  if (total > kMaxTissueVertices || anatomy.sheet.size() > kMaxMembraneNodes) {
+  if (!settings.any_size && (total > kMaxTissueVertices || anatomy.sheet.size() > kMaxMembraneNodes)) {
     Refuse(settings, std::to_string(total) + " vertices (" + std::to_string(anatomy.sheet.size()) +
                          " of them in the membrane); valid: at most " + std::to_string(kMaxTissueVertices) + " and " +
                          std::to_string(kMaxMembraneNodes) +

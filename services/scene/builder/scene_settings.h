@@ -134,6 +134,8 @@ struct SceneSettings {
   AssessmentParams assessment = UsualAssessment();
   std::vector<Vec2f> planned_line;  ///< For the assessment: (s, t) fractions in [0, 1], straight from point to point.
   std::uint32_t node_mask = 0x3e;   ///< Bit per NodeId.
+  /// More vertices are built than a frame on the bus can hold, for studies of the mesh without a session.
+  bool any_size = false;
 };
 
 /// A tool with the usual dimensions and its trocar at `p_WP`.

@@ -6,9 +6,9 @@
 #include "physics_node/collision/tissue_collision.h"
 #include "physics_node/contact_model/cautery_probe.h"
 #include "physics_node/contact_model/surface_curvature.h"
+#include "physics_node/simulation/script_player.h"
 #include "services/scene/builder/build.h"
 #include "tests/benchmark/report.h"
-#include "physics_node/simulation/script_player.h"
 
 namespace fulcrum::physics {
 namespace {

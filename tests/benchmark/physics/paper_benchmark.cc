@@ -7,10 +7,10 @@
 #include <string>
 #include <utility>
 
+#include "physics_node/simulation/script_player.h"
 #include "services/scene/builder/build.h"
 #include "tests/benchmark/physics/baselines/textbook_pbd.h"
 #include "tests/benchmark/report.h"
-#include "physics_node/simulation/script_player.h"
 
 namespace fulcrum::physics {
 namespace {

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <vector>
 
+#include "physics_node/simulation/script_player.h"
 #include "services/scene/builder/build.h"
 #include "tests/benchmark/report.h"
-#include "physics_node/simulation/script_player.h"
 
 namespace fulcrum::physics {
 namespace {

@@ -2,11 +2,14 @@
 // is left is the error of the model and its mesh, not that of a solver in real time. Heat
 // (tests/numerics/thermal/heat_cases.h) is the product's own solver.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <string>
 #include <vector>
 
+#include "physics_node/simulation/script_player.h"
+#include "services/scene/builder/build.h"
 #include "tests/benchmark/report.h"
 #include "tests/numerics/physics/sheet_cases.h"
 #include "tests/numerics/thermal/electrode_current.h"
@@ -110,6 +113,60 @@ void MeasureSource(benchmark::Report* report) {
   }
 }
 
+/// `built-in` with `finer` times the cells in each direction; wall and nodes that are bound to the organ stay.
+scene::SceneData Refined(int finer) {
+  scene::SceneSettings settings = scene::BuiltIn();
+  settings.any_size = true;
+  settings.physics.preset = PhysicsPreset::kReference;
+  settings.tube.rings = finer * (settings.tube.rings - 1) + 1;
+  settings.tube.segments *= finer;
+  scene::MembraneSettings& m = settings.membrane;
+  m.rows = finer * (m.rows - 1) + 1;
+  m.cols = finer * (m.cols - 1) + 1;
+  for (int* stride : {&m.bending_row_stride, &m.bending_col_stride, &m.binding_row_stride, &m.binding_col_stride}) {
+    *stride *= finer;
+  }
+  return scene::BuildProcedural(settings);
+}
+
+/// Force on a grasper whose tip is pressed 1, 2, 3 and 4 mm below a point of the sheet, from 3 mm above it, at rest
+/// [N].
+std::array<double, 4> PressForces(const SceneView& scene, const Vec3f& place) {
+  constexpr int kMove = 40, kRest = 40;
+  constexpr float kNeither = 0.35f;  // Neither grasps nor lets go.
+  TissueSimulation simulation(scene, 2);
+  std::array<double, 4> forces{};
+  std::array<ToolInput, kMaxTools> tools{};
+  for (std::size_t depth = 0; depth < forces.size(); ++depth) {
+    for (int i = 0; i < kMove + kRest; ++i) {
+      const float from = depth == 0 ? -3 : static_cast<float>(depth), to = static_cast<float>(depth) + 1;
+      const float mm = from + (to - from) * std::min(1.0f, static_cast<float>(i + 1) / kMove);
+      tools[0] = {true, PoseAtTip(scene.tools[0], place - Vec3f(0, 0, 1e-3f * mm), kNeither)};
+      (void)simulation.Step(tools);
+    }
+    forces[depth] = static_cast<double>(simulation.solver_force(0).norm());
+  }
+  return forces;
+}
+
+/// The default mesh against the limit of Richardson, of second order, from it and one twice as fine.
+void MeasureMesh(benchmark::Report* report) {
+  if (!report->Wants("truth.mesh.press")) return;
+  const scene::SceneData usual = Refined(1), fine = Refined(2);
+  const MembraneGrid& grid = usual.fixed.membrane;
+  const Vec3f place = usual.rest_position[grid.first + grid.rows / 2 * grid.cols + grid.cols / 2];
+  const std::array<double, 4> f1 = PressForces(usual.View(), place), f2 = PressForces(fine.View(), place);
+  double largest = 0;
+  for (std::size_t i = 0; i < f1.size(); ++i) {
+    const double limit = f2[i] + (f2[i] - f1[i]) / 3;
+    largest = std::max(largest, std::abs(f1[i] / limit - 1));
+    const std::string stem = "truth.mesh.press_" + std::to_string(i + 1) + "_mm.";
+    report->Add(stem + "force_N", f1[i], "N");
+    report->Add(stem + "twice_as_fine_N", f2[i], "N");
+  }
+  report->Add("truth.mesh.press_error_pct", 100 * largest, "%");
+}
+
 /// What others have measured on tissue: quantities, those within their tolerance, and the regimes of a blade on liver.
 void MeasurePublished(benchmark::Report* report) {
   if (!report->Wants("truth.published.")) return;
@@ -140,5 +197,6 @@ int main(int argc, char** argv) {
   fulcrum::MeasureSolids(&report);
   fulcrum::MeasureStefan(&report);
   fulcrum::MeasureSource(&report);
+  fulcrum::MeasureMesh(&report);
   fulcrum::MeasurePublished(&report);
 }

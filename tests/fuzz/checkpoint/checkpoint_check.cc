@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "physics_node/node/physics_checkpoint.h"
+#include "physics_node/simulation/script_player.h"
 #include "services/scene/builder/build.h"
 #include "services/transport/bus/gate.h"
-#include "physics_node/simulation/script_player.h"
 #include "tests/numerics/thermal/flat_scene.h"
 #include "thermal_node/coupling/thermal_solver.h"
 

@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "physics_node/collision/closest.h"
-#include "services/scene/builder/build.h"
 #include "physics_node/simulation/script_player.h"
+#include "services/scene/builder/build.h"
 
 namespace fulcrum::physics {
 namespace {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "services/scene/builder/build.h"
 #include "physics_node/simulation/script_player.h"
+#include "services/scene/builder/build.h"
 #include "tests/numerics/physics/tissue_validator.h"
 
 namespace fulcrum::physics {

@@ -1,8 +1,8 @@
 // The shipped scenes under their scripts: a plausible tent, no instability, rest afterwards.
 #include <gtest/gtest.h>
 
-#include "services/scene/builder/build.h"
 #include "physics_node/simulation/script_player.h"
+#include "services/scene/builder/build.h"
 
 namespace fulcrum::physics {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <random>
 
-#include "services/scene/builder/build.h"
 #include "physics_node/simulation/script_player.h"
+#include "services/scene/builder/build.h"
 
 namespace fulcrum::physics {
 namespace {

@@ -6,9 +6,9 @@
 
 #include "physics_node/node/physics_checkpoint.h"
 #include "physics_node/node/physics_node.h"
+#include "physics_node/simulation/script_player.h"
 #include "services/scene/builder/build.h"
 #include "services/transport/bus/in_process.h"
-#include "physics_node/simulation/script_player.h"
 
 namespace fulcrum::physics {
 namespace {

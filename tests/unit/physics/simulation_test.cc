@@ -5,10 +5,10 @@
 
 #include "haptics_node/servo/model_gate.h"
 #include "physics_node/contact_model/elastic_force.h"
+#include "physics_node/simulation/script_player.h"
 #include "physics_node/simulation/tissue_simulation.h"
 #include "services/scene/builder/build.h"
 #include "services/transport/bus/gate.h"
-#include "physics_node/simulation/script_player.h"
 #include "tests/unit/physics/sheet_scene.h"
 
 namespace fulcrum::physics {

@@ -7,9 +7,9 @@
 #include <numbers>
 #include <vector>
 
+#include "physics_node/simulation/script_player.h"
 #include "physics_node/simulation/tissue_simulation.h"
 #include "services/scene/builder/build.h"
-#include "physics_node/simulation/script_player.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -88,6 +88,32 @@ std::vector<ToolForce> Press(const SceneView& scene) {
     }
   }
   return forces;
+}
+
+/// A tool that presses or holds and does not move: the tissue falls asleep, region by region, and the force stays.
+TEST_F(ForceOfATool, StaysWhileTheTissueFallsAsleep) {
+  for (const bool grasps : {false, true}) {
+    TissueSimulation simulation(scene_);
+    const Vec3f place = scene_.rest_position[scene_.membrane.first + 144 * scene_.membrane.cols + 25];
+    std::array<ToolInput, kMaxTools> tools;
+    float before = 0;
+    for (int i = 0; i < 400; ++i) {
+      const float time = 0.01f * static_cast<float>(i), in = std::min(time / kPress_s, 1.0f);
+      const float pull = grasps ? 0.004f * std::clamp(time / kPress_s - 1, 0.0f, 1.0f) : 0.0f;
+      const float jaw = grasps && time > kPress_s ? 0.0f : 0.35f;
+      tools[0] = {true, PoseAtTip(scene_.tools[0], place + Vec3f(0, 0, 0.003f - 0.006f * in + pull), jaw)};
+      (void)simulation.Step(tools);
+      const DeviceContacts device = simulation.Contacts(0);
+      ASSERT_GT(device.count, 0u);
+      const float force = device.contacts[0].f_ref.norm();
+      if (i == 160) before = force;
+      if (i > 160) {
+        ASSERT_NEAR(force, before, 0.02f * before) << "at " << time << " s, grasps " << grasps;
+      }
+    }
+    EXPECT_GT(before, 0.1f);
+    EXPECT_LT(simulation.awake_part(), grasps ? 0.3f : 0.02f) << "a grasp keeps its regions awake";
+  }
 }
 
 /// Two iterations leave the contacts ahead of the tissue: the sum of their forces is 13 % too low, the reaction 3 %.
