@@ -11,6 +11,7 @@
 #include "physics_node/simulation/script_player.h"
 #include "services/scene/builder/build.h"
 #include "tests/benchmark/report.h"
+#include "tests/benchmark/truth/hertz.h"
 #include "tests/numerics/physics/sheet_cases.h"
 #include "tests/numerics/thermal/electrode_current.h"
 #include "tests/numerics/thermal/heat_cases.h"
@@ -167,6 +168,21 @@ void MeasureMesh(benchmark::Report* report) {
   report->Add("truth.mesh.press_error_pct", 100 * largest, "%");
 }
 
+/// The product's contact against Hertz, on a mesh with cells of 0.6 mm beneath the ball and on one with 0.4 mm.
+void MeasureHertz(benchmark::Report* report) {
+  if (!report->Wants("truth.contact.hertz")) return;
+  for (const auto& [name, bricks] : {std::pair{"hertz", 12}, {"hertz_finer", 18}}) {
+    double largest = 0;
+    for (const HertzPoint& point : PressBall(bricks)) {
+      largest = std::max(largest, std::abs(point.force_N / point.expected_N - 1));
+      report->Add(std::string("truth.contact.") + name + "_" + std::to_string(std::lround(1e6 * point.depth_m)) +
+                      "_um.force_over_expected",
+                  point.force_N / point.expected_N, "1");
+    }
+    report->Add(std::string("truth.contact.") + name + "_error_pct", 100 * largest, "%");
+  }
+}
+
 /// What others have measured on tissue: quantities, those within their tolerance, and the regimes of a blade on liver.
 void MeasurePublished(benchmark::Report* report) {
   if (!report->Wants("truth.published.")) return;
@@ -197,6 +213,7 @@ int main(int argc, char** argv) {
   fulcrum::MeasureSolids(&report);
   fulcrum::MeasureStefan(&report);
   fulcrum::MeasureSource(&report);
+  fulcrum::MeasureHertz(&report);
   fulcrum::MeasureMesh(&report);
   fulcrum::MeasurePublished(&report);
 }
