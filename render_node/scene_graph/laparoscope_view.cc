@@ -30,11 +30,10 @@ constexpr float kSerosaPerMetre = 16;  // As in membrane.frag.
 constexpr float kFatCover = 0.48f;     // fat.frag begins at 0.51.
 
 /// The numbers of the paper's eq. 15 for membrane.frag.
-void AddPrintedColour(bool printed, float ambient_C, osg::StateSet* state) {
+void AddPrintedColour(float ambient_C, osg::StateSet* state) {
   PaperColour colour;
   colour.ambient_C = ambient_C;
   const auto vec4 = [](const Eigen::Vector4f& v) { return osg::Vec4(v.x(), v.y(), v.z(), v.w()); };
-  state->addUniform(new osg::Uniform("printed", printed ? 1.0f : 0.0f));
   state->addUniform(new osg::Uniform(
       "printed_limits", osg::Vec4(colour.ambient_C, colour.vaporisation_C, colour.vaporisation, colour.brown)));
   const osg::ref_ptr<osg::Uniform> colours = new osg::Uniform(osg::Uniform::FLOAT_VEC4, "printed_colours", 3);
@@ -151,7 +150,7 @@ void LaparoscopeView::Impl::BindTextures() {
   const bool by_temperature = scene.thermal.model == ThermalModel::kPaper;
   const bool printed = by_temperature && scene.thermal.as == PaperForm::kPrinted;
   state->addUniform(new osg::Uniform("colour_by_temperature", by_temperature && !printed ? 1.0f : 0.0f));
-  AddPrintedColour(printed, scene.thermal.body_temperature_C, state);
+  if (printed) AddPrintedColour(scene.thermal.body_temperature_C, state);
   ShineFrom(scope);
   state->setMode(GL_LIGHTING, osg::StateAttribute::OFF);
 }

@@ -48,9 +48,9 @@ TissueLayers::TissueLayers(const SceneView& scene, const Laparoscope& scope)
   AddSheets();
 }
 
-void TissueLayers::Add(Layer* layer, const char* name, Order order, const char* fragment) {
+void TissueLayers::Add(Layer* layer, const char* name, Order order, const char* fragment, const char* defined) {
   layer->mesh = std::make_unique<Mesh>(name, true);
-  layer->mesh->state()->setAttributeAndModes(MakeProgram("surface.vert", fragment));
+  layer->mesh->state()->setAttributeAndModes(MakeProgram("surface.vert", fragment, defined));
   DrawIn(order, layer->mesh->state());
   geode_->addDrawable(layer->mesh->geometry());
 }
@@ -87,7 +87,8 @@ void TissueLayers::AddSheets() {
   Add(&fat_layer_, "fat", Order::kFat, "fat.frag");
   Blend(fat_layer_.mesh->state());
   fat_layer_.mesh->state()->addUniform(new osg::Uniform("behind", kFatBehind));
-  Add(&sheet_, "membrane", Order::kMembrane, "membrane.frag");
+  const bool printed = scene_.thermal.model == ThermalModel::kPaper && scene_.thermal.as == PaperForm::kPrinted;
+  Add(&sheet_, "membrane", Order::kMembrane, "membrane.frag", printed ? "AS_PRINTED" : "");
   Blend(sheet_.mesh->state());
   sheet_.mesh->state()->addUniform(new osg::Uniform("fascia_depth", kFasciaDepth));
   AddPlannedLine();

@@ -44,7 +44,7 @@ class TissueLayers {
     std::unique_ptr<Mesh> mesh;
     std::vector<Triangle> seen;
   };
-  void Add(Layer* layer, const char* name, Order order, const char* fragment);
+  void Add(Layer* layer, const char* name, Order order, const char* fragment, const char* defined = "");
   void Show(Layer* layer, std::span<const Vec3f> positions, std::span<const Triangle> triangles, Sides sides);
   void AddRectum();
   void AddSheets();

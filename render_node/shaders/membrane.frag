@@ -11,9 +11,10 @@ uniform sampler2D atlas;
 uniform sampler2D serosa_pattern;
 uniform vec2 atlas_per_metre;
 uniform float colour_by_temperature; // 1: the paper's eq. 15, a function of the present temperature.
-uniform float printed;               // 1: eq. 15 to the letter, and nothing else (geometry/paper_colour.h).
-uniform vec4 printed_limits;         // T_a and T_vaporization [degree C], v_vaporization, v_brown.
-uniform vec4 printed_colours[3];     // C1, C2, C3.
+#ifdef AS_PRINTED // The paper's eq. 15 to the letter (geometry/paper_colour.h). Apart: a software rasteriser compiles slowly.
+uniform vec4 printed_limits;     // T_a and T_vaporization [degree C], v_vaporization, v_brown.
+uniform vec4 printed_colours[3]; // C1, C2, C3.
+#endif
 uniform float fascia_depth;          // Below the peritoneum, along the normal [m].
 uniform mat4 osg_ProjectionMatrix;
 uniform int planned_points;            // Points of an exercise's planned line; 0: none.
@@ -49,19 +50,14 @@ vec2 ToFascia(vec2 m, vec3 n) {
   return step * min(1.0, 4.0 * fascia_depth * inversesqrt(dot(step, step) + 1e-12));
 }
 
-vec4 Printed(vec4 original, float v) {
-  vec4 c = v > printed_limits.z ? printed_colours[0] : v > printed_limits.w ? printed_colours[1] : printed_colours[2];
-  return (1.0 - v) * original + v * c;
-}
-
 void main() {
   vec2 m = coordinate.xy;
   vec4 heat = texture(atlas, m * atlas_per_metre);
   vec2 m_fascia = m + ToFascia(m, normalize(normal));
   vec4 heat_below = texture(atlas, m_fascia * atlas_per_metre);
-  // The paper cuts no holes in the texture.
-  heat.a = max(heat.a, printed);
-  heat_below.a = max(heat_below.a, printed);
+#ifdef AS_PRINTED
+  heat.a = heat_below.a = 1.0; // The paper cuts no holes in the texture.
+#endif
   if (coordinate.z < 0.0 || max(heat.a, heat_below.a) < 0.5) discard;
   vec4 noise = texture(serosa_pattern, m * 16.0);
   float vessel = noise.a;
@@ -101,7 +97,7 @@ void main() {
   alpha = mix(alpha, 0.95, hot);
   // Blood lies on top: the low bits of the fourth channel (geometry/atlas.h). Near slits and blood it is read without
   // interpolation: values between closed and open texels would look like blood.
-  float own = heat.a < 0.97 && printed < 0.5 ? texelFetch(atlas, ivec2(m * atlas_per_metre * vec2(textureSize(atlas, 0))), 0).a : 1.0;
+  float own = heat.a < 0.97 ? texelFetch(atlas, ivec2(m * atlas_per_metre * vec2(textureSize(atlas, 0))), 0).a : 1.0;
   float blood = own < 0.5 ? 0.0 : smoothstep(0.12, 0.7, 2.0 - 2.0 * own);
   albedo = mix(albedo, vec3(0.30, 0.006, 0.008), 0.95 * blood);
   alpha = mix(alpha, 0.96, blood);
@@ -117,16 +113,17 @@ void main() {
   vec3 fascia = mix(vec3(0.86, 0.76, 0.66), vec3(0.26, 0.10, 0.035), seared);
   vec4 upper = vec4(albedo, heat.a < 0.5 ? 0.0 : alpha);
   vec4 lower = vec4(fascia, heat_below.a < 0.5 ? 0.0 : mix(0.09 + 0.30 * strand, 0.9, max(seared, tanned)));
-  if (printed > 0.5) {
-    float v = clamp((celsius - printed_limits.x) / (printed_limits.y - printed_limits.x), 0.0, 1.0);
-    upper = Printed(upper, v);
-    lower.a = 0.0;
-    wet *= 1.0 - v;
-  }
+#ifdef AS_PRINTED
+  float v = clamp((celsius - printed_limits.x) / (printed_limits.y - printed_limits.x), 0.0, 1.0);
+  int which = v > printed_limits.z ? 0 : v > printed_limits.w ? 1 : 2;
+  upper = (1.0 - v) * upper + v * printed_colours[which];
+  lower.a = 0.001; // One layer; not 0, by which the mean of both would be divided where v is 1.
+  wet *= 1.0 - v;
+#endif
   bool from_above = dot(normal, position) < 0.0;
   vec4 near = from_above ? upper : lower, far = from_above ? lower : upper;
   float through = (1.0 - near.a) * far.a, both = near.a + through;
-  albedo = (near.a * near.rgb + through * far.rgb) / max(both, 1e-3);
+  albedo = (near.a * near.rgb + through * far.rgb) / both;
   wet *= from_above && heat.a >= 0.5 ? 1.0 : 0.4;
 
   // Highlights are opaque.
