@@ -63,7 +63,7 @@ struct Advice {
 [[nodiscard]] Advice AdviceOf(const SceneProfile& profile);
 
 /// A step in a session over a step alone, at p99: cuts, publishing, state hash, and nodes that share the cores.
-/// Measured with `built-in` on two cores, where it is 1.5 to 2.1 (deploy/docs/measurements/physics, The whole cart).
+/// Measured with `built-in` on two cores, where it is 1.4 to 2.3 (deploy/docs/measurements/physics, The whole cart).
 inline constexpr double kSessionOverAlone = 1.7;
 inline constexpr double kMostOfPeriod = 1.2;
 /// Cores that the other nodes of a cart need: with two threads on two cores a step in a session takes longer than with
