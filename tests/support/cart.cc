@@ -38,6 +38,19 @@ double FigureOf(const std::string& summary, const std::string& key) {
   return at == std::string::npos ? std::nan("") : std::atof(summary.c_str() + at + key.size() + 4);
 }
 
+std::optional<double> CpuSeconds(pid_t pid) {
+  const std::string line = ReadFile("/proc/" + std::to_string(pid) + "/stat");
+  const std::size_t name_end = line.rfind(')');
+  if (name_end == std::string::npos) return {};
+  std::istringstream fields(line.substr(name_end + 1));
+  std::string skipped;
+  constexpr int kBeforeUserTime = 11;
+  for (int i = 0; i < kBeforeUserTime; ++i) fields >> skipped;
+  double user = 0, system = 0;
+  fields >> user >> system;
+  return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
+}
+
 Cart::Cart(const std::string& scene, int domain, const std::vector<std::string>& more_arguments)
     : folder_(fs::temp_directory_path() /
               ("fulcrum-cart-" + std::to_string(::getpid()) + "-" + std::to_string(domain))) {

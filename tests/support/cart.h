@@ -25,6 +25,9 @@ bool WaitFor(double limit_s, const std::function<bool()>& done);
 /// Running child processes of a process, by name.
 [[nodiscard]] std::map<std::string, pid_t> ChildrenOf(pid_t parent);
 
+/// Processor time that a process has used [s]; none when it has ended.
+[[nodiscard]] std::optional<double> CpuSeconds(pid_t pid);
+
 /// One run of `fulcrum up SCENE`; the destructor ends all its processes.
 class Cart {
  public:

@@ -10,7 +10,6 @@
 #include <fstream>
 #include <map>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <thread>
 
@@ -30,23 +29,9 @@ using benchmark::Report;
 constexpr int kDomain = 89;
 constexpr double kPatience_s = 60;
 
-/// Processor time of a process [s]; 0 when it has ended.
-double CpuSeconds(pid_t pid) {
-  std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
-  std::string text((std::istreambuf_iterator<char>(stat)), {});
-  const std::size_t name_end = text.rfind(')');
-  if (name_end == std::string::npos) return 0;
-  std::istringstream fields(text.substr(name_end + 2));
-  std::string skipped;
-  for (int i = 0; i < 11; ++i) fields >> skipped;
-  double user = 0, system = 0;
-  fields >> user >> system;
-  return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
-}
-
 double CpuSeconds(const testing::Cart& cart) {
-  double sum = CpuSeconds(cart.pid());
-  for (const auto& [name, pid] : testing::ChildrenOf(cart.pid())) sum += CpuSeconds(pid);
+  double sum = testing::CpuSeconds(cart.pid()).value_or(0);
+  for (const auto& [name, pid] : testing::ChildrenOf(cart.pid())) sum += testing::CpuSeconds(pid).value_or(0);
   return sum;
 }
 

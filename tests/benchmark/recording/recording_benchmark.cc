@@ -41,20 +41,6 @@ constexpr double kPatience_s = 60;
 
 double Seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
 
-/// CPU time that a process has used [s]; negative if it has ended.
-double CpuTime(pid_t pid) {
-  std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
-  std::string line;
-  if (!std::getline(stat, line)) return -1;
-  std::istringstream fields(line.substr(line.rfind(')') + 1));
-  std::string skipped;
-  constexpr int kBeforeUserTime = 11;
-  for (int i = 0; i < kBeforeUserTime; ++i) fields >> skipped;
-  double user = 0, system = 0;
-  fields >> user >> system;
-  return (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
-}
-
 /// Keeps all cores busy.
 class BusyLoops {
  public:
@@ -129,10 +115,10 @@ bool Session(benchmark::Report* report) {
   if (!begun) return false;
   constexpr auto kSettle = std::chrono::seconds(2);
   std::this_thread::sleep_for(kSettle);
-  const double cpu_begin_s = CpuTime(recorder);
+  const double cpu_begin_s = testing::CpuSeconds(recorder).value_or(-1);
   const std::int64_t begin_ns = MonotonicNs();
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds - 6));
-  const double used_s = CpuTime(recorder) - cpu_begin_s;
+  const double used_s = testing::CpuSeconds(recorder).value_or(-1) - cpu_begin_s;
   report->Add("record.cpu_pct", 100 * used_s / Seconds(MonotonicNs() - begin_ns), "%");
   if (!cart.WaitForEnd(kPatience_s)) return false;
   const fs::path file = cart.session() / "recording.mcap";

@@ -35,21 +35,6 @@ using testing::TwoHosts;
 const char* const kDomain = "62";
 constexpr double kAhead_s = 1000;
 
-/// Processor time that a process has used [s].
-double CpuOf(pid_t pid) {
-  std::ifstream stream("/proc/" + std::to_string(pid) + "/stat");
-  std::string line;
-  std::getline(stream, line);
-  const std::size_t close = line.rfind(')');
-  if (close == std::string::npos) return 0;
-  std::istringstream rest(line.substr(close + 2));
-  std::string word;
-  for (int i = 0; i < 11; ++i) rest >> word;
-  double user = 0, system = 0;
-  rest >> user >> system;
-  return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
-}
-
 struct Run {
   std::string wrong;  ///< Empty: all went well.
   std::vector<HeardTool> tools;
@@ -92,10 +77,10 @@ Run RunSession(const std::string& scene_yaml, double seconds, const std::string&
     run.wrong = "the cart did not come to work\n" + cart.Said() + (host ? host->Said() : "");
     return run;
   }
-  const double cpu_before = CpuOf(cart.pid());
+  const double cpu_before = testing::CpuSeconds(cart.pid()).value_or(0);
   const double watch_s = std::max(1.0, seconds - 3);
   std::this_thread::sleep_for(std::chrono::duration<double>(watch_s));
-  run.supervisor_cpu_pct = 100 * (CpuOf(cart.pid()) - cpu_before) / watch_s;
+  run.supervisor_cpu_pct = 100 * (testing::CpuSeconds(cart.pid()).value_or(0) - cpu_before) / watch_s;
   const auto figures = [&](const char* name) { return testing::HeardLinkFigure(file("near"), name); };
   run.tissue_kB_per_s = figures("link_tissue_kB_per_s");
   run.offset_us = figures("link_clock_offset_us");
