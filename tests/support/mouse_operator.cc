@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <thread>
+#include <vector>
 
 #include "render_node/geometry/laparoscope.h"
 #include "services/base/core/operator_script.h"
@@ -13,6 +14,7 @@
 namespace fulcrum::testing {
 
 using Clock = std::chrono::steady_clock;
+using Seconds = std::chrono::duration<double>;
 
 Eyes::Eyes(int domain)
     : participant_(ReaderOf(domain, "watch")),
@@ -49,19 +51,52 @@ MouseOperator::MouseOperator(const RenderParams& camera, MouseAndKeyboard* hand,
 }
 
 bool MouseOperator::Go(std::size_t tool, const Vec3f& target, float speed_m_s, float near_m) {
-  constexpr float kPeriod_s = 0.02f;
-  const auto limit = Clock::now() + std::chrono::seconds(12);
-  for (auto next = Clock::now(); next < limit; next += std::chrono::milliseconds(20)) {
-    std::this_thread::sleep_until(next);
+  return Follow(tool, {&target, 1}, speed_m_s, near_m);
+}
+
+bool MouseOperator::Follow(std::size_t tool, std::span<const Vec3f> places, float speed_m_s, float near_m) {
+  const auto limit = Clock::now() + std::chrono::seconds(30);
+  while (true) {
     eyes_->Look();
-    const Vec3f tip = eyes_->tools.tools[tool].p_WT, left = target - tip;
-    if (left.norm() < near_m) return true;
-    // The tool follows the pointer with a lag of some periods: near the target it goes slower.
-    const Vec3f step = left * std::min(0.15f, speed_m_s * kPeriod_s / left.norm());
-    const float metres = pixel_ * forward_.dot(tip - eye_);
-    Send(step.dot(right_) / metres, -step.dot(up_) / metres, step.dot(forward_) / metres);
+    const Vec3f begin = eyes_->tools.tools[tool].p_WT;
+    if ((places.back() - begin).norm() < near_m) return true;
+    if (Clock::now() > limit) return false;
+    Vec3f at = begin;
+    for (const Vec3f& place : places) {
+      Draw(at, place, speed_m_s);
+      at = place;
+    }
+    AwaitStand(tool, begin, (at - begin).norm());
+    places = places.last(1);
   }
-  return false;
+}
+
+void MouseOperator::Draw(const Vec3f& from, const Vec3f& to, float speed_m_s) {
+  constexpr std::chrono::milliseconds kPeriod(20);
+  const Vec3f way = to - from;
+  const int steps = static_cast<int>(std::ceil(way.norm() / (speed_m_s * Seconds(kPeriod).count())));
+  auto next = Clock::now();
+  for (int i = 0; i < steps; ++i) {
+    const Vec3f step = way / static_cast<float>(steps);
+    const float metres = pixel_ * forward_.dot(from + step * static_cast<float>(i) - eye_);
+    Send(step.dot(right_) / metres, -step.dot(up_) / metres, step.dot(forward_) / metres);
+    std::this_thread::sleep_until(next += kPeriod);
+  }
+}
+
+void MouseOperator::AwaitStand(std::size_t tool, const Vec3f& from, float way_m) {
+  constexpr Seconds kStand(0.15), kLongestLag(1.5);
+  const auto ordered = Clock::now();
+  Vec3f last = eyes_->tools.tools[tool].p_WT;
+  for (auto moved = ordered; Clock::now() - moved < kStand;) {
+    std::this_thread::sleep_for(Seconds(0.02));
+    eyes_->Look();
+    const Vec3f& tip = eyes_->tools.tools[tool].p_WT;
+    const bool under_way = (tip - from).norm() < 0.7f * way_m && Clock::now() - ordered < kLongestLag;
+    if ((tip - last).norm() < 1e-4f && !under_way) continue;
+    last = tip;
+    moved = Clock::now();
+  }
 }
 
 void MouseOperator::Send(float x, float y, float deep) {
@@ -94,8 +129,8 @@ DissectionByMouse DissectByMouse(const SceneView& view, MouseAndKeyboard* hand, 
   require(move.Go(0, place(0, 1.2), 0.1f), "the grasper does not reach the tissue from above");
   require(move.Go(0, place(0, 2.0), 0.03f, 2e-3f), "the grasper does not reach the membrane");
   hand->Click("k");
-  require(seen(3, [&] { return eyes->handles.handles[0].jaw_angle_rad < 0.1f; }), "the jaws do not close");
-  require(seen(3, [&] { return grasped() > 0; }), "the jaws hold nothing");
+  require(seen(10, [&] { return eyes->handles.handles[0].jaw_angle_rad < 0.1f; }), "the jaws do not close");
+  require(seen(10, [&] { return grasped() > 0; }), "the jaws hold nothing");
   const float low = grasper.p_WT.z();
   require(move.Go(0, place(0, 5.8), 0.015f, 3e-3f), "the grasper does not lift the membrane");
   eyes->Look();
@@ -109,10 +144,12 @@ DissectionByMouse DissectByMouse(const SceneView& view, MouseAndKeyboard* hand, 
     require(move.Go(1, place(1, time_s), time_s < 7 ? 0.06f : 0.02f, 2e-3f), "the hook does not reach the membrane");
   }
   hand->Press("f", true);
-  require(seen(2, [&] { return eyes->handles.pedals == kPedalCut; }), "the pedal is not down");
-  for (double time_s = 8; time_s < 14.9; time_s += 0.5) (void)move.Go(1, place(1, time_s), 0.005f, 1.5e-3f);
+  require(seen(10, [&] { return eyes->handles.pedals == kPedalCut; }), "the pedal is not down");
+  std::vector<Vec3f> line;
+  for (double time_s = 8; time_s < 14.9; time_s += 0.5) line.push_back(place(1, time_s));
+  require(move.Follow(1, line, 0.005f), "the hook does not reach the end of the line");
   hand->Press("f", false);
-  require(seen(2, [&] { return eyes->handles.pedals == kPedalNone; }), "the pedal does not rise");
+  require(seen(10, [&] { return eyes->handles.pedals == kPedalNone; }), "the pedal does not rise");
   (void)move.Go(1, place(1, 15.8), 0.05f, 3e-3f);
   (void)seen(1.5, [] { return false; });  // The published length follows at a limited rate.
   done.cut_mm = 1e3 * eyes->topology.cut_length_m;
@@ -122,7 +159,7 @@ DissectionByMouse DissectByMouse(const SceneView& view, MouseAndKeyboard* hand, 
   hand->Click("1");
   require(move.Go(0, place(0, 16.2), 0.03f, 3e-3f), "the grasper does not come back");
   hand->Click("k");
-  require(seen(3, [&] { return grasped() == 0; }), "the jaws do not release the membrane");
+  require(seen(10, [&] { return grasped() == 0; }), "the jaws do not release the membrane");
   require(move.Go(0, place(0, 19.0), 0.08f, 3e-3f), "the grasper does not leave");
   (void)seen(0.5, [] { return false; });
   done.released = grasped();

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "services/base/core/scene_view.h"
@@ -39,11 +40,17 @@ class MouseOperator {
  public:
   MouseOperator(const RenderParams& camera, MouseAndKeyboard* hand, Eyes* eyes);
 
-  /// Moves the tip of a tool to `target` at `speed_m_s`, straight, by the pointer, with Control along the view. False:
-  /// it did not arrive.
+  /// Moves the tip of a tool to `target` at `speed_m_s`, straight, by the pointer, with Control along the view, waits
+  /// until it stands, and corrects what is left: right with any lag between pointer and tool. False: it did not arrive.
   bool Go(std::size_t tool, const Vec3f& target, float speed_m_s, float near_m = 1.5e-3f);
+  /// The same through several places, without a stop at those before the last.
+  bool Follow(std::size_t tool, std::span<const Vec3f> places, float speed_m_s, float near_m = 1.5e-3f);
 
  private:
+  /// Orders a straight way from `from` to `to`.
+  void Draw(const Vec3f& from, const Vec3f& to, float speed_m_s);
+  /// Waits until the tool stands, `way_m` from where it was.
+  void AwaitStand(std::size_t tool, const Vec3f& from, float way_m);
   /// Whole pixels; the rest is kept for the next time.
   void Send(float x, float y, float deep);
 

@@ -78,7 +78,7 @@ TEST(Hands, AMouseAndAKeyboardGraspPullCutAndReleaseAndTheSessionReplays) {
   EXPECT_TRUE(hand.Go(0, place(0, 0.0), 0.15f)) << eyes.tools.tools[0].p_WT.transpose();
   EXPECT_TRUE(hand.Go(0, place(0, grasp_s), 0.05f)) << eyes.tools.tools[0].p_WT.transpose();
   client.Click("k");
-  EXPECT_TRUE(WaitFor(2, [&] {
+  EXPECT_TRUE(WaitFor(10, [&] {
     eyes.Look();
     return eyes.handles.handles[0].jaw_angle_rad < 0.1f;
   })) << "the jaw does not close";
@@ -92,17 +92,17 @@ TEST(Hands, AMouseAndAKeyboardGraspPullCutAndReleaseAndTheSessionReplays) {
   EXPECT_TRUE(hand.Go(1, begin + Vec3f(0, 0, 0.02f), 0.15f));
   EXPECT_TRUE(hand.Go(1, begin, 0.05f, 3e-3f));
   client.Press("f", true);
-  EXPECT_TRUE(WaitFor(2, [&] {
+  EXPECT_TRUE(WaitFor(10, [&] {
     eyes.Look();
     return eyes.handles.pedals == kPedalCut;
   })) << "the pedal is not down";
   (void)hand.Go(1, place(1, 4.8), 0.006f, 2e-3f);
   client.Press("f", false);
-  EXPECT_TRUE(WaitFor(2, [&] {
+  EXPECT_TRUE(WaitFor(10, [&] {
     eyes.Look();
     return eyes.handles.pedals == kPedalNone;
   }));
-  EXPECT_TRUE(WaitFor(2,
+  EXPECT_TRUE(WaitFor(10,
                       [&] {
                         eyes.Look();
                         return eyes.topology.cut_length_m > 4e-3f;
