@@ -1,5 +1,6 @@
 #include "handle_bridge/node/handle_bridge_node.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -12,6 +13,16 @@ constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 /// Buffer for one tick's bytes. In 2.5 ms at 115200 baud at most 29 bytes arrive; the rest is for the backlog of a late
 /// tick.
 constexpr std::size_t kReadBytes = 512;
+
+/// While nothing changes and no pedal is down, HandleState is published this rarely.
+constexpr std::int64_t kLongestSilence_ns = 9'000'000;
+/// Smaller changes of an angle are the noise of the potentiometer, about a count of the converter.
+constexpr float kSameAngle_rad = 0.005f;
+
+bool LooksTheSame(const HandleSample& a, const HandleSample& b) {
+  return a.present == b.present && a.quality == b.quality &&
+         std::abs(a.jaw_angle_rad - b.jaw_angle_rad) < kSameAngle_rad;
+}
 
 }  // namespace
 
@@ -68,11 +79,21 @@ void HandleBridgeNode::Step(const Tick& tick) {
     state_.handles[tool] = ReadHandle(tool, dt_s);
   }
   state_.pedals = ReadPedals(dt_s);
-  state_.stamp = stamper_.Next(tick.stamp_ns);
-  if (output_->has_readers()) {
-    output_->Write(state_);
-  }
+  Publish(tick);
   published_.Store(snapshot_);
+}
+
+/// A pedal that is down is repeated each period: whether the current flows must not wait.
+void HandleBridgeNode::Publish(const Tick& tick) {
+  const bool quiet = state_.pedals == kPedalNone && state_.pedals == sent_.pedals &&
+                     std::equal(state_.handles.begin(), state_.handles.end(), sent_.handles.begin(), &LooksTheSame) &&
+                     tick.stamp_ns - sent_.stamp.stamp_ns < kLongestSilence_ns;
+  if (quiet || !output_->has_readers()) {
+    return;
+  }
+  state_.stamp = stamper_.Next(tick.stamp_ns);
+  output_->Write(state_);
+  sent_ = state_;
 }
 
 void HandleBridgeNode::DropBacklog() {

@@ -70,6 +70,7 @@ class HandleBridgeNode {
   [[nodiscard]] HandleSample ReadHandle(std::size_t tool, double dt_s);
   [[nodiscard]] HandleSample ReadLine(std::size_t tool, double dt_s);
   [[nodiscard]] std::uint8_t ReadPedals(double dt_s);
+  void Publish(const Tick& tick);
 
   std::array<config::HandleConfig, kMaxTools> handles_;
   CalibrationStore calibrations_;
@@ -82,6 +83,7 @@ class HandleBridgeNode {
   bus::Stamper stamper_;
   std::uint64_t next_index_ = 0;
   HandleState state_;
+  HandleState sent_;  ///< The newest published one.
   Snapshot snapshot_;
   runtime::SeqLock<Snapshot> published_;
 };

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "haptics_node/device/simulated_device.h"
+#include "services/base/core/message_fields.h"
 
 namespace fulcrum::haptics {
 namespace {
@@ -30,6 +32,23 @@ std::array<OperatedDevice*, kMaxTools> OperatedAmong(const DeviceArray& devices)
   std::transform(devices.begin(), devices.end(), operated.begin(),
                  [](const auto& device) { return dynamic_cast<OperatedDevice*>(device.get()); });
   return operated;
+}
+
+bool Alike(const Quatf& a, const Quatf& b) { return a.coeffs() == b.coeffs(); }
+template <class T>
+bool Alike(const T& a, const T& b) {
+  return a == b;
+}
+
+/// Whether the tools are the same but for the ages of their contact models.
+bool AlikeButForAge(const ToolState& a, const ToolState& b) {
+  return std::equal(a.tools.begin(), a.tools.end(), b.tools.begin(), [](const ToolSample& x, const ToolSample& y) {
+    bool alike = true;
+    ForEachField<ToolSample>([&](std::string_view name, auto member) {
+      alike = alike && (name == "model_age_s" || Alike(x.*member, y.*member));
+    });
+    return alike;
+  });
 }
 
 void AddTrouble(Health* health, const std::string& trouble) {
@@ -91,20 +110,35 @@ void HapticsNode::BusStep() {
 
 void HapticsNode::Publish(const TickRecord& tick) {
   const ServoRecord& record = tick.servo;
-  ToolState tool = record.tool;
-  tool.stamp = {++tool_sequence_, epoch_, record.tool.stamp.stamp_ns};
-  ports_.tool_state.Write(tool);
-
+  PublishTool(record.tool);
+  manifest_.tick_times_ns.push_back(record.tool.stamp.stamp_ns);
   if (!record.model_taken && !tick.input_taken && record.tick < next_manifest_tick_) return;
   next_manifest_tick_ = record.tick + kTicksPerManifest;
-  if (!ports_.tick_manifest.has_readers()) return;
   manifest_.stamp = {++manifest_sequence_, epoch_, record.tool.stamp.stamp_ns};
   manifest_.tick = record.tick;
   manifest_.session_time_s = record.session_time_s;
   manifest_.state_hash = record.state_hash;
   manifest_.consumed[0] = {TopicId::kContactModel, record.model_epoch, record.model_sequence};
   manifest_.consumed[1] = {TopicId::kOperatorInput, tick.input_epoch, tick.input_sequence};
-  ports_.tick_manifest.Write(manifest_);
+  if (ports_.tick_manifest.has_readers()) ports_.tick_manifest.Write(manifest_);
+  manifest_.tick_times_ns.clear();
+}
+
+/// Between the samples of tools that stay the same, readers may interpolate: the last sample before a change is
+/// published with it.
+void HapticsNode::PublishTool(const ToolState& tool) {
+  const bool changed = tool_sequence_ == 0 || !AlikeButForAge(tool, newest_tool_);
+  if (changed && quiet_ticks_ > 0) Write(newest_tool_);
+  if (changed || ++quiet_ticks_ == kTicksPerQuietTool) {
+    Write(tool);
+    quiet_ticks_ = 0;
+  }
+  newest_tool_ = tool;
+}
+
+void HapticsNode::Write(ToolState tool) {
+  tool.stamp = {++tool_sequence_, epoch_, tool.stamp.stamp_ns};
+  ports_.tool_state.Write(tool);
 }
 
 void HapticsNode::FillHealth(Health* health) const {

@@ -21,6 +21,8 @@ namespace fulcrum::haptics {
 
 /// A manifest is published for each tick that admits a contact model, and at least every this many ticks.
 inline constexpr std::uint64_t kTicksPerManifest = 10;
+/// While tools and forces stay the same, ToolState is published every this many ticks.
+inline constexpr std::uint64_t kTicksPerQuietTool = 10;
 
 class HapticsNode {
  public:
@@ -60,6 +62,8 @@ class HapticsNode {
   };
 
   void Publish(const TickRecord& record);
+  void PublishTool(const ToolState& tool);
+  void Write(ToolState tool);
   void FillDeviceHealth(Health* health) const;
 
   Ports ports_;
@@ -85,6 +89,8 @@ class HapticsNode {
   OperatorInput received_input_;
   OperatorChoice operator_;
   TickRecord record_;
+  ToolState newest_tool_;          ///< Of the tick before.
+  std::uint64_t quiet_ticks_ = 0;  ///< Since a ToolState was published.
   TickManifest manifest_;
   std::uint64_t tool_sequence_ = 0, manifest_sequence_ = 0;
   std::uint64_t next_manifest_tick_ = 0;

@@ -20,8 +20,9 @@ namespace {
 // Changes of a pose below these limits are not visible: a fifth of a pixel at 10 cm.
 constexpr float kSamePlace = 2e-5f;   // [m]
 constexpr float kSameAngle = 0.002f;  // [rad]
+constexpr float kSameJaw = 0.01f;     // [rad]: a pixel at the tip; above the noise of a handle's potentiometer.
 constexpr float kSameForce = 0.05f;   // [N]: half of the resolution of the displayed figure.
-constexpr float kSameZoom = 0.03f;    // [rad] of the ring: above the noise of a handle's potentiometer.
+constexpr float kSameZoom = 0.03f;    // [rad] of the ring: above that noise.
 constexpr float kBoils_C = 90;        // Highest temperature of a patch above which there is steam.
 constexpr float kSameSoil = 0.02f;
 constexpr double kTextLife_s = 4.0;  // Duration for which a temperature or a warning is shown.
@@ -401,7 +402,7 @@ void RenderNode::TakeTools() {
       HandleSample& shown = handles_.handles[i];
       const HandleSample& now = new_handles_.handles[i];
       const bool scope = scene_.tools[i].kind == ToolKind::kScope;
-      if (now.present && std::abs(now.jaw_angle_rad - shown.jaw_angle_rad) > (scope ? kSameZoom : kSameAngle)) {
+      if (now.present && std::abs(now.jaw_angle_rad - shown.jaw_angle_rad) > (scope ? kSameZoom : kSameJaw)) {
         shown = now;
         view_.SetJaw(k, now.jaw_angle_rad);
         if (scope) FollowScope();

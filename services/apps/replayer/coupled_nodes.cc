@@ -1,6 +1,7 @@
 #include "services/apps/replayer/coupled_nodes.h"
 
 #include <filesystem>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -47,9 +48,19 @@ void CoupledNodes::Replace(NodeId owner, std::vector<T>* inputs, const std::map<
   *inputs = std::move(replaced);
 }
 
+void CoupledNodes::ReplaceTools(std::vector<ToolState>* inputs) const {
+  if (!Has(NodeId::kHaptics)) return;
+  std::vector<ToolState> replaced;
+  for (const ToolState& input : *inputs) {
+    const auto later = tools_.upper_bound(input.stamp.stamp_ns);
+    if (later != tools_.begin()) replaced.push_back(std::prev(later)->second);
+  }
+  *inputs = std::move(replaced);
+}
+
 Outcome CoupledNodes::Step(const RecordedTick& recorded) {
   RecordedTick tick = recorded;
-  Replace(NodeId::kHaptics, &tick.tools, tools_);
+  ReplaceTools(&tick.tools);
   Replace(NodeId::kPhysics, &tick.model, models_);
   Replace(NodeId::kPhysics, &tick.cautery, cautery_);
   const auto take_newest = [&tick]<class T>(std::deque<T>* sent, std::vector<T>* inputs) {
@@ -68,14 +79,16 @@ Outcome CoupledNodes::Step(const RecordedTick& recorded) {
   for (const Published& published : node.TakeOutputs()) {
     if (std::optional<ThermalEvent> event; Decode(published, &event)) {
       outcome.events.push_back(*event);
+    } else if (std::optional<ToolState> tools; Decode(published, &tools)) {
+      Keep(tools, &tools_);
     } else {
-      (void)(Decode(published, &outcome.tools) || Decode(published, &outcome.frame) ||
-             Decode(published, &outcome.model) || Decode(published, &outcome.cautery) ||
-             Decode(published, &outcome.topology) || Decode(published, &outcome.open_cells) ||
-             Decode(published, &outcome.tear) || Decode(published, &outcome.patch));
+      (void)(Decode(published, &outcome.frame) || Decode(published, &outcome.model) ||
+             Decode(published, &outcome.cautery) || Decode(published, &outcome.topology) ||
+             Decode(published, &outcome.open_cells) || Decode(published, &outcome.tear) ||
+             Decode(published, &outcome.patch));
     }
   }
-  Keep(outcome.tools, &tools_);
+  if (tick.node == NodeId::kHaptics && !tools_.empty()) outcome.tools = tools_.rbegin()->second;
   Keep(outcome.model, &models_);
   Keep(outcome.cautery, &cautery_);
   if (outcome.topology && Has(NodeId::kPhysics)) topology_.push_back(*outcome.topology);

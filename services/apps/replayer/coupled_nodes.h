@@ -16,7 +16,7 @@ namespace fulcrum::replay {
 /// Decoded outputs of a tick, as far as other nodes or a comparison need them.
 struct Outcome {
   std::uint64_t state_hash = 0;
-  std::optional<ToolState> tools;
+  std::optional<ToolState> tools;  ///< Of a tick of haptics; the newest that it has published.
   std::optional<TissueFrame> frame;
   std::optional<ContactModel> model;
   std::optional<CauteryContact> cautery;
@@ -38,6 +38,8 @@ class CoupledNodes {
  private:
   template <class T>
   void Replace(NodeId owner, std::vector<T>* inputs, const std::map<std::int64_t, T>& sent) const;
+  /// A tool stays where it is until the next sample.
+  void ReplaceTools(std::vector<ToolState>* inputs) const;
   [[nodiscard]] bool Has(NodeId node) const { return nodes_.count(node) != 0; }
 
   std::map<NodeId, std::unique_ptr<ReplayedNode>> nodes_;

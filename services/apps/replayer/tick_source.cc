@@ -50,19 +50,17 @@ bool TickSource::Next(RecordedTick* tick) {
   Progress& progress = progress_[static_cast<std::size_t>(tick->node)];
   const bool first = progress.epoch != tick->epoch;
   if (first) progress = {tick->epoch, 0, 0, {}};
-  if (rest.sequence != progress.sequence + 1) {
-    tick->missing = "the recording lacks " + std::to_string(rest.sequence - progress.sequence - 1) + " ticks of " +
-                    NodeName(tick->node) + " before this one";
-  } else if (first && tick->node != NodeId::kHaptics && tick->tick.index != 0) {
+  const bool haptics = tick->node == NodeId::kHaptics;
+  if (rest.sequence != progress.sequence + 1 && !(haptics && rest.sequence == progress.sequence)) {
+    tick->missing = "the recording lacks " + std::to_string(rest.sequence - progress.sequence - 1) +
+                    (haptics ? " manifests of " : " ticks of ") + NodeName(tick->node) + " before this one";
+  } else if (first && !haptics && tick->tick.index != 0) {
     tick->missing = "the recording begins " + std::to_string(tick->tick.index) + " ticks after the start of " +
                     NodeName(tick->node);
   }
   progress.sequence = rest.sequence;
-  if (tick->node == NodeId::kHaptics) {
-    CompleteHaptics(tick);
-    progress.index = tick->tick.index;
-    return true;
-  }
+  if (!rest.has_manifest) Complete(tick);
+  progress.index = tick->tick.index;
   for (const ConsumedInput& consumed : rest.consumed) {
     switch (consumed.topic) {
       case TopicId::kToolState:
@@ -86,6 +84,12 @@ bool TickSource::Next(RecordedTick* tick) {
       case TopicId::kCauteryContact:
         Fetch(*tick, consumed, cautery_, &tick->cautery, &tick->missing);
         break;
+      case TopicId::kContactModel:
+        Fetch(*tick, consumed, models_, &tick->model, &tick->missing);
+        break;
+      case TopicId::kOperatorInput:
+        Fetch(*tick, consumed, operators_, &tick->operators, &tick->missing);
+        break;
       default:
         break;
     }
@@ -93,24 +97,13 @@ bool TickSource::Next(RecordedTick* tick) {
   return true;
 }
 
-/// The time of a tick is that of its ToolState; the manifest with the same stamp, if any, contains the other fields.
-void TickSource::CompleteHaptics(RecordedTick* tick) {
-  tick->tick.index = progress_[static_cast<std::size_t>(NodeId::kHaptics)].index + 1;
+void TickSource::Complete(RecordedTick* tick) {
+  tick->tick.index = progress_[static_cast<std::size_t>(tick->node)].index + 1;
   if (session_) {
     tick->tick.session_time_s = 1e-9 * static_cast<double>(tick->tick.stamp_ns - session_->session_start_ns);
   } else if (tick->missing.empty()) {
     tick->missing = "the recording lacks the start of the session (no SceneManifest)";
   }
-  const auto manifest = haptics_manifests_.find(tick->tick.stamp_ns);
-  if (manifest == haptics_manifests_.end() || manifest->second.stamp.epoch != tick->epoch) return;
-  tick->tick.index = manifest->second.tick;
-  tick->tick.session_time_s = manifest->second.session_time_s;
-  tick->state_hash = manifest->second.state_hash;
-  for (const ConsumedInput& consumed : manifest->second.consumed) {
-    if (consumed.topic == TopicId::kContactModel) Fetch(*tick, consumed, models_, &tick->model, &tick->missing);
-    if (consumed.topic == TopicId::kOperatorInput) Fetch(*tick, consumed, operators_, &tick->operators, &tick->missing);
-  }
-  haptics_manifests_.erase(haptics_manifests_.begin(), std::next(manifest));
 }
 
 template <class T>
@@ -145,10 +138,7 @@ void TickSource::Take(const recording::McapMessage& message) {
   }
   switch (known->second) {
     case TopicId::kToolState:
-      if (ToolState tools; Decode(message, &tools)) {
-        tools_.Put(tools);
-        if (wanted(NodeId::kHaptics)) TakeToolState(tools);
-      }
+      if (ToolState tools; wanted(NodeId::kPhysics) && Decode(message, &tools)) tools_.Put(tools);
       break;
     case TopicId::kHandleState:
       if (HandleState handles; (wanted(NodeId::kPhysics) || wanted(NodeId::kThermal)) && Decode(message, &handles)) {
@@ -190,29 +180,22 @@ void TickSource::Take(const recording::McapMessage& message) {
 void TickSource::TakeManifest(const TickManifest& manifest) {
   newest_ns_ = std::max(newest_ns_, manifest.stamp.stamp_ns);
   if (!wanted(manifest.node)) return;
-  if (manifest.node == NodeId::kHaptics) {
-    haptics_manifests_.insert_or_assign(manifest.stamp.stamp_ns, manifest);
-    return;
-  }
   Pending pending;
   pending.tick.node = manifest.node;
   pending.tick.epoch = manifest.stamp.epoch;
   pending.tick.tick = {manifest.tick, manifest.session_time_s, period_s_[static_cast<std::size_t>(manifest.node)],
                        manifest.stamp.stamp_ns};
+  pending.sequence = manifest.stamp.sequence;
+  for (const std::int64_t ns : manifest.tick_times_ns) {
+    if (ns >= manifest.stamp.stamp_ns) break;
+    Pending before = pending;
+    before.tick.tick.stamp_ns = ns;
+    before.has_manifest = false;
+    pending_.emplace(ns, std::move(before));
+  }
   pending.tick.state_hash = manifest.state_hash;
   pending.consumed = manifest.consumed;
-  pending.sequence = manifest.stamp.sequence;
   pending_.emplace(manifest.stamp.stamp_ns, std::move(pending));
-}
-
-void TickSource::TakeToolState(const ToolState& tools) {
-  newest_ns_ = std::max(newest_ns_, tools.stamp.stamp_ns);
-  Pending pending;
-  pending.tick.node = NodeId::kHaptics;
-  pending.tick.epoch = tools.stamp.epoch;
-  pending.tick.tick = {0, 0, period_s_[static_cast<std::size_t>(NodeId::kHaptics)], tools.stamp.stamp_ns};
-  pending.sequence = tools.stamp.sequence;
-  pending_.emplace(tools.stamp.stamp_ns, std::move(pending));
 }
 
 }  // namespace fulcrum::replay

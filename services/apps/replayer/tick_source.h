@@ -47,8 +47,8 @@ class SampleShelf {
 /// Reads the recording once, from its beginning, and delays each tick until its inputs have been read: a sample may
 /// follow the manifest of the tick that consumed it, because the order between topics in a recording is arbitrary.
 ///
-/// Physics and thermal send a TickManifest for each tick. For haptics each ToolState is a tick, and the manifests name
-/// the ticks that consumed a contact model.
+/// Physics and thermal send a TickManifest for each tick, haptics one for several ticks, of which only the last one has
+/// consumed inputs.
 class TickSource {
  public:
   /// @param nodes the requested ones of physics, thermal and haptics.
@@ -77,9 +77,8 @@ class TickSource {
   template <class T>
   bool Decode(const recording::McapMessage& message, T* sample);
   void TakeManifest(const TickManifest& manifest);
-  void TakeToolState(const ToolState& tools);
+  /// Index and session time of a tick without a manifest of its own.
   void Complete(RecordedTick* tick);
-  void CompleteHaptics(RecordedTick* tick);
   template <class T>
   void Fetch(const RecordedTick& tick, const ConsumedInput& consumed, const SampleShelf<T>& shelf,
              std::vector<T>* samples, std::string* missing);
@@ -88,7 +87,8 @@ class TickSource {
   struct Pending {
     RecordedTick tick;
     std::vector<ConsumedInput> consumed;
-    std::uint64_t sequence = 0;  ///< Sequence of its manifest or ToolState: a gap is a tick that the recording lacks.
+    std::uint64_t sequence = 0;  ///< Sequence of its manifest: a gap is a tick that the recording lacks.
+    bool has_manifest = true;    ///< False: one of haptics before that of its manifest.
   };
   struct Progress {
     std::uint64_t epoch = 0, sequence = 0, index = 0;
@@ -109,8 +109,7 @@ class TickSource {
   SampleShelf<CauteryContact> cautery_{1024};
   SampleShelf<ContactModel> models_{1024};
   SampleShelf<OperatorInput> operators_{4096};
-  std::map<std::int64_t, TickManifest> haptics_manifests_;  ///< By the stamp of their tick [ns].
-  std::multimap<std::int64_t, Pending> pending_;            ///< By the stamp of the tick [ns].
+  std::multimap<std::int64_t, Pending> pending_;  ///< By the stamp of the tick [ns].
   std::array<Progress, kNodeCount> progress_;
   std::int64_t newest_ns_ = 0;
   std::uint64_t undecodable_ = 0;

@@ -48,7 +48,7 @@ namespace fulcrum {
 #define FULCRUM_FIELDS_OF_SceneManifest(F) F(stamp) F(scene_name) F(session_id) F(scene_hash) F(session_start_ns) \
   F(mode) F(recorded)
 #define FULCRUM_FIELDS_OF_ConsumedInput(F) F(topic) F(epoch) F(sequence)
-#define FULCRUM_FIELDS_OF_TickManifest(F) F(stamp) F(node) F(tick) F(session_time_s) F(state_hash) F(consumed)
+#define FULCRUM_FIELDS_OF_TickManifest(F) F(stamp) F(node) F(tick) F(session_time_s) F(state_hash) F(consumed) F(tick_times_ns)
 #define FULCRUM_FIELDS_OF_TimingSummary(F) F(p50_us) F(p99_us) F(max_us)
 #define FULCRUM_FIELDS_OF_InputHealth(F) F(topic) F(matched) F(age_ms) F(received) F(lost) F(rejected)
 #define FULCRUM_FIELDS_OF_Metric(F) F(name) F(value)

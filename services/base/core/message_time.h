@@ -1,8 +1,10 @@
 // The times in a message, for its conversion to another clock.
 #pragma once
 
+#include <cstdint>
 #include <string_view>
 #include <type_traits>
+#include <vector>
 
 #include "services/base/core/message_fields.h"
 
@@ -18,6 +20,10 @@ void ForEachTime(T* message, const Visit& visit) {
       auto& part = message->*member;
       if constexpr (std::is_integral_v<std::remove_reference_t<decltype(part)>>) {
         if (part != 0 && (name == "epoch" || name.ends_with("_ns"))) visit(name, part);
+      } else if constexpr (std::is_same_v<std::remove_reference_t<decltype(part)>, std::vector<std::int64_t>>) {
+        for (std::int64_t& time : part) {
+          if (time != 0) visit(name, time);
+        }
       } else {
         ForEachTime(&part, visit);
       }

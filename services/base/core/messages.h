@@ -384,6 +384,9 @@ struct TickManifest {
   double session_time_s = 0;
   std::uint64_t state_hash = 0;
   std::vector<ConsumedInput> consumed;  ///< At most kMaxConsumedInputs of services/transport/bus/gate.h.
+  /// Of haptics_node: CLOCK_MONOTONIC of each tick after the manifest before, the last one of this tick [ns]; at most
+  /// kMaxTickTimes.
+  std::vector<std::int64_t> tick_times_ns;
 };
 
 // --------------------------------------------------------------------------------------------------- Health

@@ -174,7 +174,8 @@ bool PassesGate(const SceneManifest& m) noexcept {
 
 bool PassesGate(const TickManifest& m) noexcept {
   return IsStamp(m.stamp) && IsNode(m.node) && IsSessionTime(m.session_time_s) &&
-         m.consumed.size() <= kMaxConsumedInputs &&
+         m.consumed.size() <= kMaxConsumedInputs && m.tick_times_ns.size() <= kMaxTickTimes &&
+         std::all_of(m.tick_times_ns.begin(), m.tick_times_ns.end(), [](std::int64_t ns) { return ns >= 0; }) &&
          std::all_of(m.consumed.begin(), m.consumed.end(), [](const ConsumedInput& c) { return IsTopic(c.topic); });
 }
 

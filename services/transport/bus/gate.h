@@ -30,6 +30,7 @@ inline constexpr float kUnitTolerance = 1e-2f;
 /// Largest number of inputs in a TickManifest. thermal_node has the most: eight contacts, for each two HandleStates and
 /// a GeneratorSetting; a TearState.
 inline constexpr std::size_t kMaxConsumedInputs = 33;
+inline constexpr std::size_t kMaxTickTimes = 10;
 inline constexpr std::size_t kMaxInputHealths = 16;
 inline constexpr std::size_t kMaxMetrics = 24;
 inline constexpr std::size_t kMaxMetricName = 31;

@@ -5,9 +5,11 @@
 
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -19,6 +21,7 @@
 #include "services/scene/format/scene_file.h"
 #include "tests/benchmark/report.h"
 #include "tests/support/cart.h"
+#include "tests/support/mouse_operator.h"
 
 namespace fulcrum {
 namespace {
@@ -58,6 +61,22 @@ std::optional<double> LastMetric(const fs::path& recording, NodeId node, const s
     });
   }
   return last;
+}
+
+/// Pictures that render_node draws in some seconds.
+double PicturesIn(double seconds) {
+  testing::Eyes eyes(kDomain);
+  const auto drawn = [&eyes] {
+    double pictures = std::numeric_limits<double>::quiet_NaN();
+    (void)testing::WaitFor(kPatience_s, [&] {
+      eyes.Look();
+      return std::isfinite(pictures = eyes.Metric(NodeId::kRender, "frames_drawn"));
+    });
+    return pictures;
+  };
+  const double before = drawn();
+  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+  return drawn() - before;
 }
 
 struct Step {
@@ -130,6 +149,7 @@ bool Idle(Report* report) {
     if (well) {
       std::this_thread::sleep_for(std::chrono::seconds(4));  // The tissue comes to rest.
       report->Add("cart.idle_cpu_pct", CpuPct(cart, report->quick() ? 5 : 15), "%");
+      report->Add("cart.pictures_drawn_at_rest", PicturesIn(report->quick() ? 5 : 20), "1");
     }
   }
   fs::remove(yaml);

@@ -231,6 +231,7 @@ inline TickManifest Sample(std::uint64_t sequence) {
   m.session_time_s = 4.5;
   m.state_hash = 0x99aabbccddeeff00ull;
   m.consumed = {{TopicId::kToolState, 5, 6}, {TopicId::kHealth, 7, 8}};
+  m.tick_times_ns = {10000, 11000, 12000};
   return m;
 }
 

@@ -31,6 +31,8 @@ inline constexpr std::size_t kMost<&TearState::torn_edges> = idl::MAX_EDGE_BYTES
 template <>
 inline constexpr std::size_t kMost<&TickManifest::consumed> = kMaxConsumedInputs;
 template <>
+inline constexpr std::size_t kMost<&TickManifest::tick_times_ns> = kMaxTickTimes;
+template <>
 inline constexpr std::size_t kMost<&Health::inputs> = kMaxInputHealths;
 template <>
 inline constexpr std::size_t kMost<&Health::metrics> = kMaxMetrics;
