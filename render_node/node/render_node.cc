@@ -20,7 +20,7 @@ namespace {
 // Changes of a pose below these limits are not visible: a fifth of a pixel at 10 cm.
 constexpr float kSamePlace = 2e-5f;   // [m]
 constexpr float kSameAngle = 0.002f;  // [rad]
-constexpr float kSameJaw = 0.01f;     // [rad]: a pixel at the tip; above the noise of a handle's potentiometer.
+constexpr float kSameJaw = 0.015f;    // [rad]: a pixel at the tip; above the noise of a handle's potentiometer.
 constexpr float kSameForce = 0.05f;   // [N]: half of the resolution of the displayed figure.
 constexpr float kSameZoom = 0.03f;    // [rad] of the ring: above that noise.
 constexpr float kBoils_C = 90;        // Highest temperature of a patch above which there is steam.

@@ -36,6 +36,8 @@ using runtime::MonotonicNs;
 
 constexpr std::int64_t kSessionUnknown = std::numeric_limits<std::int64_t>::max();
 constexpr auto kPollPeriod = std::chrono::milliseconds(10);
+/// During the session only orders, refusals and another scene are expected.
+constexpr auto kServePeriod = std::chrono::milliseconds(20);
 /// Phase of a node's steps relative to multiples k of the session's period dt, in periods. Physics begins just after k
 /// dt, when the ToolState of that time has arrived; thermal begins when the contact of that physics step has arrived.
 constexpr double kPhysicsPhase = 0.12, kThermalPhase = 0.65;
@@ -208,7 +210,7 @@ struct NodeApp::Impl {
   }
 
   void ServeUntilEnd() {
-    for (; !ShouldEnd(); std::this_thread::sleep_for(kPollPeriod)) Poll();
+    for (; !ShouldEnd(); std::this_thread::sleep_for(kServePeriod)) Poll();
   }
 
   void EndThreads(runtime::CyclicThread* steps, std::jthread* health) {

@@ -80,8 +80,8 @@ export async function until(page, limit_s, done, argument) {
   throw new Error(`after ${limit_s} s it does not hold: ${done}`);
 }
 
-/** The page shows live pictures. */
-export const drawn = () => Number(document.getElementById('picture').dataset.live || 0) > 5;
+/** The page shows live pictures; while nothing moves it gets only the first. */
+export const drawn = () => Number(document.getElementById('picture').dataset.live || 0) > 0;
 
 /** Waits until `nodes` nodes run and the page shows them live, and takes the controls by mouse. */
 export async function takeControls(page, nodes) {
