@@ -45,8 +45,10 @@ const char* NodePulse::Complaint(bool has_spare, std::int64_t now_ns) const {
   constexpr const char* kSilent = "sent no Health for too long and was killed";
   if (now_ns < timeouts_reset_ns_) return nullptr;  // Health that was waiting may have come meanwhile, and no more.
   if (!has_reported_) return now_ns - started_ns_ > kLongestStart_ns ? kSilent : nullptr;
+  // The first step is part of the start, and a spare that was used is not made again in this time.
+  const bool replaceable = has_spare && steps_ && ticks_ > 0;
   const std::int64_t longest =
-      std::max(has_spare && steps_ ? kLongestStillWithSpare_ns : kLongestStill_ns, kLongestStill_periods * period_ns_);
+      std::max(replaceable ? kLongestStillWithSpare_ns : kLongestStill_ns, kLongestStill_periods * period_ns_);
   if (now_ns - std::max(health_ns_, timeouts_reset_ns_) > longest) return kSilent;
   if (steps_ && now_ns - std::max(progress_ns_, timeouts_reset_ns_) > longest)
     return "was stuck in a step for too long and was killed";

@@ -71,7 +71,8 @@ void SessionRecord::AddHealth(double time_s, const Health& health) {
     track.base_drops += track.live_drops;
   }
   const bool works = health.state == HealthState::kRunning || health.state == HealthState::kDegraded;
-  if (health.state == HealthState::kRunning && figures.dead_since_s >= 0) {
+  const bool rejoins = health.state == HealthState::kRunning && figures.dead_since_s >= 0;
+  if (rejoins) {
     const double rejoin_s = time_s - figures.dead_since_s;
     figures.dead_since_s = -1;
     figures.longest_rejoin_s = std::max(figures.longest_rejoin_s, rejoin_s);
@@ -89,8 +90,9 @@ void SessionRecord::AddHealth(double time_s, const Health& health) {
   }
   figures.heard_s = time_s;
   const bool advanced = is_new || !figures.begun || figures.ticks != track.base_ticks + track.live_ticks;
-  if (works && advanced) figures.progress_s = time_s;
+  if (works && (advanced || rejoins)) figures.progress_s = time_s;
   figures.begun |= works;
+  figures.stepped = health.ticks > 0;
   figures.pid = health.pid;
   figures.state = health.state;
   figures.rate_asked_Hz = static_cast<double>(health.rate_asked_Hz);

@@ -51,6 +51,7 @@ struct NodeFigures {
   int crashes = 0;              ///< Restarts after a death that no command asked for.
   double longest_rejoin_s = 0;  ///< From a death to the first Health "running".
   bool begun = false;           ///< It has run in this session.
+  bool stepped = false;         ///< Its newest process has completed a step.
   double heard_s = 0;           ///< Session time of the newest Health.
   double progress_s = 0;        ///< ... and of the newest one, running or degraded, with further ticks.
   /// Session time of the death after which no process has run yet; negative: it lives.

@@ -94,6 +94,8 @@ void Verdict::WatchProgress(NodeId node, double longest_gap_s, double time_s, co
     }
     return;
   }
+  // The first step is part of the start: a picture compiles and uploads what it shows.
+  if (!figures.stepped) longest_gap_s = std::max(longest_gap_s, kLongestAbsence_s);
   if (figures.rate_asked_Hz > 0) longest_gap_s = std::max(longest_gap_s, kLongestGap_periods / figures.rate_asked_Hz);
   if (time_s - std::max(figures.progress_s, no_gap_before_s_) <= longest_gap_s) return;
   const bool is_silent = time_s - std::max(figures.heard_s, no_gap_before_s_) > longest_gap_s;

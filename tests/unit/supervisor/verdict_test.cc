@@ -167,6 +167,27 @@ TEST_F(VerdictTest, DeathsUpToTheAllowedNumberAreWell) {
             "render_node died 4 times, of which 3 are allowed (verdict.restarts of the cart): killed by signal 9\n");
 }
 
+TEST_F(VerdictTest, TheFirstStepAfterARestartMayTakeLonger) {
+  RunFor(12);
+  Die(&picture_);
+  RunFor(0.6);
+  Return(&picture_);
+  picture_.achieved_Hz = 0;
+  picture_.state = HealthState::kWaiting;
+  RunFor(0.2);
+  picture_.state = HealthState::kRunning;
+  RunFor(3);
+  EXPECT_EQ(Faults(), "");
+  picture_.achieved_Hz = 9;
+  RunFor(2);
+  EXPECT_EQ(Faults(), "");
+  Die(&picture_);
+  Return(&picture_);
+  picture_.achieved_Hz = 0;
+  RunFor(5.5);
+  EXPECT_EQ(Faults(), "render_node was stuck for more than 5.0 s\n");
+}
+
 TEST_F(VerdictTest, RestartsByCommandAreNotCounted) {
   RunFor(2);
   for (int restart = 0; restart < 9; ++restart) DieAndReturn(&servo_, true);
@@ -308,6 +329,14 @@ TEST_F(PulseTest, HealthThatGoesOnWithoutTicksIsStuck) {
   EXPECT_EQ(At(11.3, true), "was stuck in a step for too long and was killed");
   Say(11.4, 6);
   EXPECT_EQ(At(11.4, true), "");
+}
+
+TEST_F(PulseTest, TheFirstStepIsPartOfTheStart) {
+  Say(10, 0);
+  Say(14, 0);
+  EXPECT_EQ(At(14, true), "");
+  Say(15.1, 0);
+  EXPECT_EQ(At(15.1, true), "was stuck in a step for too long and was killed");
 }
 
 TEST_F(PulseTest, ANodeThatWaitsForItsSessionHasNoTicks) {
