@@ -13,7 +13,7 @@ constexpr double kBudget_ms = 28;  // Of the 33 ms at 30 pictures a second, with
 constexpr double kStepCost = 1.5;  // A step finer costs up to this factor more.
 constexpr double kSmoothBudget_ms = 12, kSmoothStepCost = 2;  // The same for scales above 1.
 constexpr int kCalmWindows = 6;                               // About two seconds, to prevent oscillation.
-constexpr int kMostSmoothLines = 1440;  // Of larger pictures the textures would take half a gigabyte.
+constexpr float kMostSmoothLines = 3060;                      // The textures of more would take half a gigabyte.
 constexpr float kFewestLines = 270;
 constexpr float kHalf = 0.52f;            // A coarser step is for large pictures only …
 constexpr float kFewestLinesLarge = 374;  // … which have at least as many lines then.
@@ -46,7 +46,8 @@ void QualityControl::SetHeight(int height) {
   const auto enough = [height](float scale) {
     return scale * static_cast<float>(height) >= (scale < kHalf ? kFewestLinesLarge : kFewestLines);
   };
-  first_step_ = smooth_ && height <= kMostSmoothLines ? 0 : kFull;
+  first_step_ = smooth_ ? 0 : kFull;
+  while (first_step_ < kFull && kScales[first_step_] * static_cast<float>(height) > kMostSmoothLines) ++first_step_;
   last_step_ = kFull;
   while (last_step_ + 1 < kScales.size() && enough(kScales[last_step_ + 1])) ++last_step_;
   if (quality_ == Quality::kHigh) {

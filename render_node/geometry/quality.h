@@ -23,15 +23,15 @@ class QualityControl {
   /// than 374 at a scale below 0.52. `smooth`: scales above 1 are used.
   QualityControl(Quality quality, int height, bool smooth = false);
 
-  /// Two by two samples a pixel, which the picture's bilinear sampling averages exactly.
-  static constexpr float kMostScale = 2;
+  /// Four by four samples a pixel, which four bilinear samples average exactly (shaders/smooth.frag).
+  static constexpr float kMostScale = 4;
 
   /// The picture has another height [pixels]. With kAuto the scene gets no more lines than it had, as far as there is a
   /// scale for it; finer steps follow as above.
   void SetHeight(int height);
   /// Adds the drawing time of one picture [ms].
   void Add(double draw_ms);
-  /// Largest scale at the present height: 1 or kMostScale.
+  /// Largest scale at the present height: 1, or up to kMostScale while the scene has at most 3,060 lines.
   [[nodiscard]] float most() const { return kScales[first_step_]; }
   [[nodiscard]] float scale() const { return kScales[first_ ? last_step_ : step_]; }
 
@@ -40,9 +40,9 @@ class QualityControl {
   [[nodiscard]] double CostOfFiner(std::size_t step) const;
 
   // Above 1 each step has half of the pixels of the one before, from 1 on about 0.7.
-  static constexpr std::size_t kFull = 2;
-  static constexpr std::array<float, 15> kScales{kMostScale, 1.41f, 1.0f,  0.85f, 0.72f, 0.61f, 0.52f, 0.44f,
-                                                 0.37f,      0.31f, 0.26f, 0.22f, 0.19f, 0.16f, 0.13f};
+  static constexpr std::size_t kFull = 4;
+  static constexpr std::array<float, 17> kScales{kMostScale, 2.83f, 2.0f,  1.41f, 1.0f,  0.85f, 0.72f, 0.61f, 0.52f,
+                                                 0.44f,      0.37f, 0.31f, 0.26f, 0.22f, 0.19f, 0.16f, 0.13f};
   static constexpr std::size_t kWindow = 9;
 
   Quality quality_;

@@ -76,8 +76,10 @@ Optics::Optics(const Laparoscope& scope, int width, int height, osg::Node* backg
       picture_centre_(new osg::Uniform("picture_centre", osg::Vec2())),
       texture_scale_(new osg::Uniform("texture_scale", osg::Vec2(1, 1))),
       texture_most_(new osg::Uniform("texture_most", osg::Vec2(1, 1))),
+      pixel_(new osg::Uniform("pixel", osg::Vec2())),
       soil_(new osg::Uniform("soil", 0.0f)),
       clear_lens_(MakeProgram("field.vert", "field.frag")),
+      smooth_lens_(MakeProgram("field.vert", "smooth.frag")),
       soiled_lens_(MakeProgram("field.vert", "soiled.frag")) {
   osg::StateSet* state = node_->getOrCreateStateSet();
   state->addUniform(circle_radius_);
@@ -161,6 +163,7 @@ void Optics::AddField() {
   field.state()->addUniform(new osg::Uniform("scene_picture", static_cast<int>(kPictureUnit)));
   field.state()->addUniform(texture_scale_);
   field.state()->addUniform(texture_most_);
+  field.state()->addUniform(pixel_);
   field.state()->addUniform(soil_);
   field.state()->setMode(GL_DEPTH_TEST, osg::StateAttribute::OFF);
   field.state()->setRenderBinDetails(0, "RenderBin");
@@ -201,6 +204,8 @@ void Optics::UseScale() {
   texture_scale_->set(used);
   // Texels beyond this hold an older picture of another resolution.
   texture_most_->set(used - texel * 0.5f);
+  pixel_->set(osg::Vec2(used.x() / static_cast<float>(width_), used.y() / static_cast<float>(height_)));
+  UseLens();
   BackgroundChanged();
 }
 
@@ -214,7 +219,13 @@ void Optics::SetScope(const Laparoscope& scope) {
 
 void Optics::SetSoil(float soil) {
   soil_->set(soil);
-  field_state_->setAttributeAndModes(soil > 0 ? soiled_lens_ : clear_lens_);
+  UseLens();
+}
+
+void Optics::UseLens() {
+  float soil = 0;
+  (void)soil_->get(soil);
+  field_state_->setAttributeAndModes(soil > 0 ? soiled_lens_ : scale_ > 1 ? smooth_lens_ : clear_lens_);
 }
 
 void Optics::SceneChanged() { scene_.camera->setNodeMask(~0u); }

@@ -40,6 +40,7 @@ class Optics {
   void BackgroundChanged();
   void AddField();
   void UseScale();
+  void UseLens();
   void ResizeTextures();
   [[nodiscard]] int Texels(int pixels) const;
 
@@ -48,8 +49,8 @@ class Optics {
   int height_;
   float scale_ = 1, most_ = 1;
   osg::ref_ptr<osg::Group> node_;
-  osg::ref_ptr<osg::Uniform> circle_radius_, picture_centre_, texture_scale_, texture_most_, soil_;
-  osg::ref_ptr<osg::Program> clear_lens_, soiled_lens_;
+  osg::ref_ptr<osg::Uniform> circle_radius_, picture_centre_, texture_scale_, texture_most_, pixel_, soil_;
+  osg::ref_ptr<osg::Program> clear_lens_, smooth_lens_, soiled_lens_;
   osg::ref_ptr<osg::StateSet> field_state_;
   Target background_, scene_;
 };

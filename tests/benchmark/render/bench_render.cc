@@ -96,7 +96,7 @@ void FullScene(const SceneView& scene, std::uint32_t width, std::uint32_t height
   report->Add(prefix + "frame_ms_p95", benchmark::Quantile(frame_ms, 0.95), "ms");
   report->Add(prefix + "cpu_side_ms_p50", benchmark::Quantile(cpu_side_ms, 0.5), "ms");
   report->Add(prefix + "scale", quality.scale(), "1");
-  for (const auto& [name, scale] : {std::pair{"smooth", 2.0f}, {"high", 1.0f}, {"low", 0.52f}}) {
+  for (const auto& [name, scale] : {std::pair{"smooth4", 4.0f}, {"smooth2", 2.0f}, {"high", 1.0f}, {"low", 0.52f}}) {
     if (scale > quality.most()) continue;
     laparoscope.SetScale(scale);
     int step = 0;
@@ -161,7 +161,7 @@ void Edges(const SceneView& scene, benchmark::Report* report) {
       if (most > kEdge) edges.push_back(at(x, y));
     }
   }
-  for (const auto& [name, scale] : {std::pair{"low", 0.52f}, {"high", 1.0f}, {"smooth", 2.0f}}) {
+  for (const auto& [name, scale] : {std::pair{"low", 0.52f}, {"high", 1.0f}, {"smooth2", 2.0f}, {"smooth4", 4.0f}}) {
     const Bitmap picture = draw(1, scale);
     double sum = 0;
     for (const std::size_t edge : edges) {

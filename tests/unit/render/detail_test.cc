@@ -168,7 +168,7 @@ TEST(QualityTest, NeverGoesBelowLegible) {
   }
 }
 
-/// On a GPU: two by two samples a pixel while a picture takes at most 12 ms.
+/// On a GPU: up to four by four samples a pixel while a picture takes at most 12 ms.
 TEST(QualityTest, SmoothsWhereThereIsTime) {
   QualityControl quality(Quality::kAuto, 1080, true);
   quality.Add(50);
@@ -182,9 +182,10 @@ TEST(QualityTest, SmoothsWhereThereIsTime) {
   EXPECT_EQ(quality.scale(), 1.41f);
   for (int k = 0; k < 200; ++k) quality.Add(13);
   EXPECT_EQ(quality.scale(), 1.0f) << "above 12 ms and below 28";
-  EXPECT_EQ(QualityControl(Quality::kHigh, 1080, true).scale(), 2.0f);
+  EXPECT_EQ(QualityControl(Quality::kHigh, 540, true).scale(), 4.0f);
+  EXPECT_EQ(QualityControl(Quality::kHigh, 1080, true).scale(), 2.83f);
   quality.SetHeight(2160);
-  EXPECT_EQ(quality.most(), 1.0f) << "the textures would be too large";
+  EXPECT_EQ(quality.most(), 1.41f) << "the textures of a finer scale would be too large";
 }
 
 TEST(QualityTest, ALargerPictureBeginsWithTheLinesOfTheLastAndASmallerOneWithAllOfIts) {
