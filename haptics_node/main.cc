@@ -46,7 +46,7 @@ fulcrum::ExitCode RunHaptics(fulcrum::app::NodeApp& app) {
 int main(int argc, char** argv) {
   if (fulcrum::haptics::IsCalibrateCommand(argc, argv)) return fulcrum::haptics::CalibrateMain(argc, argv);
   return fulcrum::app::NodeMain(argc, argv, fulcrum::NodeId::kHaptics,
-                                "Reads the devices, renders the forces of the tissue, publishes ToolState at 1 kHz.\n"
+                                "Reads the devices, renders the forces of the tissue at 1 kHz, publishes ToolState.\n"
                                 "`haptics_node calibrate-trocar --help`: measures the position of a trocar.",
                                 RunHaptics);
 }

@@ -16,7 +16,7 @@ constexpr std::size_t kReadBytes = 512;
 
 /// While nothing changes and no pedal is down, HandleState is published this rarely.
 constexpr std::int64_t kLongestSilence_ns = 9'000'000;
-/// Smaller changes of an angle are the noise of the potentiometer, about a count of the converter.
+/// Smaller changes of an angle, up to two thirds of a count of the converter, are mostly noise.
 constexpr float kSameAngle_rad = 0.005f;
 
 bool LooksTheSame(const HandleSample& a, const HandleSample& b) {

@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <string>
-#include <string_view>
 #include <utility>
 
 #include "haptics_node/device/simulated_device.h"
-#include "services/base/core/message_fields.h"
 
 namespace fulcrum::haptics {
 namespace {
@@ -34,23 +32,6 @@ std::array<OperatedDevice*, kMaxTools> OperatedAmong(const DeviceArray& devices)
   return operated;
 }
 
-bool Alike(const Quatf& a, const Quatf& b) { return a.coeffs() == b.coeffs(); }
-template <class T>
-bool Alike(const T& a, const T& b) {
-  return a == b;
-}
-
-/// Whether the tools are the same but for the ages of their contact models.
-bool AlikeButForAge(const ToolState& a, const ToolState& b) {
-  return std::equal(a.tools.begin(), a.tools.end(), b.tools.begin(), [](const ToolSample& x, const ToolSample& y) {
-    bool alike = true;
-    ForEachField<ToolSample>([&](std::string_view name, auto member) {
-      alike = alike && (name == "model_age_s" || Alike(x.*member, y.*member));
-    });
-    return alike;
-  });
-}
-
 void AddTrouble(Health* health, const std::string& trouble) {
   if (health->state == HealthState::kRunning) health->state = HealthState::kDegraded;
   if (!health->last_error.empty()) health->last_error += "; ";
@@ -68,7 +49,8 @@ HapticsNode::HapticsNode(const SceneView& scene, DeviceArray devices, const Port
       devices_(std::move(devices)),
       operated_(OperatedAmong(devices_)),
       servo_(ServoSettingsOf(scene), Pointers(devices_)),
-      epoch_(static_cast<std::uint64_t>(epoch_ns)) {
+      epoch_(static_cast<std::uint64_t>(epoch_ns)),
+      thinner_(static_cast<double>(scene.physics.dt_s)) {
   manifest_.node = NodeId::kHaptics;
   manifest_.consumed.resize(2);
 }
@@ -110,7 +92,12 @@ void HapticsNode::BusStep() {
 
 void HapticsNode::Publish(const TickRecord& tick) {
   const ServoRecord& record = tick.servo;
-  PublishTool(record.tool);
+  const ToolThinner::Due& due = thinner_.Add(record.tool, record.session_time_s);
+  for (std::size_t i = 0; i < due.count; ++i) {
+    ToolState tool = due.states[i];
+    tool.stamp = {++tool_sequence_, epoch_, tool.stamp.stamp_ns};
+    ports_.tool_state.Write(tool);
+  }
   manifest_.tick_times_ns.push_back(record.tool.stamp.stamp_ns);
   if (!record.model_taken && !tick.input_taken && record.tick < next_manifest_tick_) return;
   next_manifest_tick_ = record.tick + kTicksPerManifest;
@@ -122,23 +109,6 @@ void HapticsNode::Publish(const TickRecord& tick) {
   manifest_.consumed[1] = {TopicId::kOperatorInput, tick.input_epoch, tick.input_sequence};
   if (ports_.tick_manifest.has_readers()) ports_.tick_manifest.Write(manifest_);
   manifest_.tick_times_ns.clear();
-}
-
-/// Between the samples of tools that stay the same, readers may interpolate: the last sample before a change is
-/// published with it.
-void HapticsNode::PublishTool(const ToolState& tool) {
-  const bool changed = tool_sequence_ == 0 || !AlikeButForAge(tool, newest_tool_);
-  if (changed && quiet_ticks_ > 0) Write(newest_tool_);
-  if (changed || ++quiet_ticks_ == kTicksPerQuietTool) {
-    Write(tool);
-    quiet_ticks_ = 0;
-  }
-  newest_tool_ = tool;
-}
-
-void HapticsNode::Write(ToolState tool) {
-  tool.stamp = {++tool_sequence_, epoch_, tool.stamp.stamp_ns};
-  ports_.tool_state.Write(tool);
 }
 
 void HapticsNode::FillHealth(Health* health) const {

@@ -8,6 +8,7 @@
 
 #include "haptics_node/device/haptic_device.h"
 #include "haptics_node/device/operated_device.h"
+#include "haptics_node/node/tool_thinner.h"
 #include "haptics_node/servo/servo.h"
 #include "services/base/core/messages.h"
 #include "services/base/core/operator_choice.h"
@@ -21,8 +22,6 @@ namespace fulcrum::haptics {
 
 /// A manifest is published for each tick that admits a contact model, and at least every this many ticks.
 inline constexpr std::uint64_t kTicksPerManifest = 10;
-/// While tools and forces stay the same, ToolState is published every this many ticks.
-inline constexpr std::uint64_t kTicksPerQuietTool = 10;
 
 class HapticsNode {
  public:
@@ -62,8 +61,6 @@ class HapticsNode {
   };
 
   void Publish(const TickRecord& record);
-  void PublishTool(const ToolState& tool);
-  void Write(ToolState tool);
   void FillDeviceHealth(Health* health) const;
 
   Ports ports_;
@@ -89,8 +86,7 @@ class HapticsNode {
   OperatorInput received_input_;
   OperatorChoice operator_;
   TickRecord record_;
-  ToolState newest_tool_;          ///< Of the tick before.
-  std::uint64_t quiet_ticks_ = 0;  ///< Since a ToolState was published.
+  ToolThinner thinner_;
   TickManifest manifest_;
   std::uint64_t tool_sequence_ = 0, manifest_sequence_ = 0;
   std::uint64_t next_manifest_tick_ = 0;

@@ -18,7 +18,7 @@ class ConsoleTest : public ::testing::Test {
     // From 3 s on the recorded tools are altered.
     testing::CartStory story{.seconds = 3.2};
     story.tool_change = [](ToolState* tools) {
-      if (tools->stamp.sequence > 3000) tools->tools[0].p_WT.x() += 1e-3f;
+      if (tools->stamp.stamp_ns >= testing::kCartStart_ns + 3 * kSecond_ns) tools->tools[0].p_WT.x() += 1e-3f;
       return true;
     };
     session_ = std::make_unique<testing::ShortSession>("console_test", story, [](scene::SceneData*) {});

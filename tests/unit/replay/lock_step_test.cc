@@ -64,6 +64,11 @@ class LockStepTest : public ::testing::Test {
   std::filesystem::path folder_;
 };
 
+/// Time of a sample in the session.
+std::int64_t Milliseconds(const ToolState& tools) {
+  return (tools.stamp.stamp_ns - testing::kCartStart_ns) / 1'000'000;
+}
+
 const std::vector<NodeId> kAll{NodeId::kPhysics, NodeId::kThermal, NodeId::kHaptics};
 
 TEST_F(LockStepTest, ComesToTheSameStates) {
@@ -112,7 +117,7 @@ TEST_F(LockStepTest, ReplaysWhatTractionTears) {
 TEST_F(LockStepTest, NamesWhatDiffersFirst) {
   CartStory story{.seconds = 1};
   story.tool_change = [](ToolState* tools) {
-    if (tools->stamp.sequence > 700) tools->tools[0].p_WT.x() += 1e-4f;
+    if (Milliseconds(*tools) >= 700) tools->tools[0].p_WT.x() += 1e-4f;
     return true;
   };
   Record(story);
@@ -126,12 +131,17 @@ TEST_F(LockStepTest, NamesWhatDiffersFirst) {
 
 TEST_F(LockStepTest, SaysWhatTheRecordingLacks) {
   CartStory story{.seconds = 1};
-  story.tool_change = [](ToolState* tools) { return tools->stamp.sequence != 501; };
+  std::string left_out = "none";
+  story.tool_change = [&left_out](ToolState* tools) {
+    if (Milliseconds(*tools) != 500) return true;
+    left_out = "ToolState #" + std::to_string(tools->stamp.sequence) + " ";
+    return false;
+  };
   story.manifest_change = [](TickManifest* m) { return m->node != NodeId::kHaptics || m->stamp.sequence != 50; };
   Record(story);
   LockStepResult result = Replay({NodeId::kPhysics, NodeId::kHaptics});
   EXPECT_FALSE(result.good());
-  EXPECT_NE(result.nodes[0].missing.find("ToolState #501"), std::string::npos) << ReportText(result);
+  EXPECT_NE(result.nodes[0].missing.find(left_out), std::string::npos) << ReportText(result);
   EXPECT_EQ(result.nodes[0].missing.find("the last of its process"), std::string::npos) << ReportText(result);
   EXPECT_NE(result.nodes[1].missing.find("lacks 1 manifests of haptics_node"), std::string::npos) << ReportText(result);
 
@@ -144,10 +154,15 @@ TEST_F(LockStepTest, SaysWhatTheRecordingLacks) {
 
 TEST_F(LockStepTest, TellsASampleThatAKilledProcessDidNotSendToTheRecorder) {
   CartStory story{.seconds = 1, .kill_haptics_s = 0.801};
-  story.tool_change = [](ToolState* tools) { return tools->stamp.sequence != 801; };
+  std::string left_out = "none";
+  story.tool_change = [&left_out](ToolState* tools) {
+    if (Milliseconds(*tools) != 800) return true;
+    left_out = "ToolState #" + std::to_string(tools->stamp.sequence) + " ";
+    return false;
+  };
   Record(story);
   const LockStepResult result = Replay({NodeId::kPhysics});
-  EXPECT_NE(result.nodes[0].missing.find("ToolState #801"), std::string::npos) << ReportText(result);
+  EXPECT_NE(result.nodes[0].missing.find(left_out), std::string::npos) << ReportText(result);
   EXPECT_NE(result.nodes[0].missing.find("the last of its process"), std::string::npos) << ReportText(result);
 }
 

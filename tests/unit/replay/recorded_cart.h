@@ -70,6 +70,8 @@ class TappedTopic {
   std::vector<std::uint8_t> bytes_;
 };
 
+inline constexpr std::int64_t kCartStart_ns = 1'000'000'000'000;  ///< Begin of the session.
+
 struct CartStory {
   double seconds = 3;
   double kill_physics_s = -1;  ///< Killed without notice, restarted 30 ms later.
@@ -111,7 +113,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
   TappedTopic<SceneManifest> sessions(&writer);
 
   constexpr std::int64_t kMillisecond = 1'000'000;
-  constexpr std::int64_t kStart = 1'000'000'000'000;
+  constexpr std::int64_t kStart = kCartStart_ns;
   auto session_out = sessions.MakeOutput();
   SceneManifest session;
   session.stamp = {1, kStart, kStart};
