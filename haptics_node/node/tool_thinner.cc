@@ -7,7 +7,7 @@
 namespace fulcrum::haptics {
 namespace {
 
-constexpr double kShortestDt_s = 4e-3;   // Of physics: below it four samples a step are all ticks.
+constexpr double kShortestDt_s = 4e-3;  // Of physics: below it four samples a step are all ticks.
 // The next tick is expected as long after this one as this after the last, and a little later.
 constexpr double kLongestTick_s = 2e-3, kLater_s = 5e-5;
 
