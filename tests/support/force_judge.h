@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <string>
 
 #include "haptics_node/kinematics/trocar.h"
@@ -41,14 +42,11 @@ class ForceJudge {
   Vec3d f_A_ = Vec3d::Zero();
   double force_ = 0, least_ = 0, most_ = 0, peak_ = 0, peak_step_ = 0;
   ServoState state_ = ServoState::kOff;
-  // History of the present rise over the last ticks.
-  static constexpr std::uint64_t kWindow = 5;
   struct Past {
-    std::uint64_t sequence = 0;
+    std::int64_t stamp_ns = 0;
     double force = 0;
-    bool rising = false;
   };
-  Past past_[kWindow];
+  std::deque<Past> rise_;        ///< The present rise, from the newest sample on that is at least a window old.
   std::int64_t held_up_ns_ = 0;  ///< Time of the last delay of the servo that exceeds kLongestTick_ns.
   std::string verdict_;
 };
