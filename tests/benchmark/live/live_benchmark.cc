@@ -95,7 +95,29 @@ struct Sample {
   std::uint64_t overruns;  ///< Of physics since its start, as last reported: periods without a step.
 };
 
-/// Runs the session and returns the samples that the servo published for tool 0.
+/// Adds the ticks of the servo that it did not publish, because linear interpolation gives them.
+std::vector<Sample> EachTick(const std::vector<Sample>& published) {
+  std::vector<Sample> ticks;
+  for (std::size_t i = 0; i < published.size(); ++i) {
+    const Sample& a = published[i];
+    ticks.push_back(a);
+    if (i + 1 == published.size()) break;
+    const Sample& b = published[i + 1];
+    const auto count = static_cast<int>(std::lround(1e3 * (b.time_s - a.time_s)));
+    for (int k = 1; k < count; ++k) {
+      const float u = static_cast<float>(k) / static_cast<float>(count);
+      Sample between = a;
+      between.time_s += static_cast<double>(u) * (b.time_s - a.time_s);
+      between.tool.p_WT += u * (b.tool.p_WT - a.tool.p_WT);
+      between.tool.f_W += u * (b.tool.f_W - a.tool.f_W);
+      between.tool.q_WT = a.tool.q_WT.normalized().slerp(u, b.tool.q_WT.normalized());
+      ticks.push_back(between);
+    }
+  }
+  return ticks;
+}
+
+/// Runs the session and returns what the servo did with tool 0, tick by tick.
 /// @param step of physics_node, as last reported.
 std::vector<Sample> Record(const SceneView& scene, const std::filesystem::path& folder, TimingSummary* step) {
   bus::DdsParticipant participant({.domain = kDomain, .node_name = "benchmark", .shared_memory = {}});
@@ -150,7 +172,7 @@ std::vector<Sample> Record(const SceneView& scene, const std::filesystem::path& 
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
-  return samples;
+  return EachTick(samples);
 }
 
 /// Pose of tool 0 as physics takes it.
