@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "haptics_node/device/simulated_device.h"
+#include "services/transport/bus/gate.h"
 
 namespace fulcrum::haptics {
 namespace {
@@ -39,6 +40,8 @@ void AddTrouble(Health* health, const std::string& trouble) {
 }
 
 }  // namespace
+
+static_assert(kTicksPerManifest <= bus::kMaxTickTimes, "a manifest must have room for the times of its ticks");
 
 HapticsNode::HapticsNode(const SceneView& scene, const std::array<bool, kMaxTools>& simulated, const Ports& ports,
                          std::int64_t epoch_ns)
