@@ -37,6 +37,7 @@ std::uint16_t Copier::AddChannel(const recording::McapReader& reader, const reco
   }
   const std::uint16_t number =
       writer_->AddChannel(schema_number, channel.topic, channel.message_encoding, channel.metadata);
+  if (const auto coding = recording::FindPointCoding(channel.metadata)) packer_.Code(number, *coding);
   is_large_[number] = IsLarge(channel.topic);
   return number;
 }
@@ -45,7 +46,9 @@ void Copier::Copy(const recording::McapReader& reader, const recording::McapMess
   const std::uint16_t channel = ChannelOf(reader, message.channel);
   const std::uint64_t log_time_ns = message.log_time_ns + static_cast<std::uint64_t>(shift_ns);
   for (Part& part : parts_) {
-    if (part.records.size() >= recording::ChunkPacker::kChunkBytes ||
+    const std::size_t most =
+        &part == &parts_[1] ? recording::ChunkPacker::kCodedChunkBytes : recording::ChunkPacker::kChunkBytes;
+    if (part.records.size() >= most ||
         (log_time_ns > part.first_ns && log_time_ns - part.first_ns >= kLongestChunk_ns)) {
       EndChunk(&part);
     }

@@ -10,7 +10,7 @@
 #include "services/base/runtime/cyclic_thread.h"
 #include "services/base/runtime/realtime.h"
 #include "services/records/recorder/priorities.h"
-#include "services/transport/bus/schema.h"
+#include "services/records/recorder/recorded_type.h"
 #include "services/transport/bus/topics.h"
 
 namespace fulcrum::recorder {
@@ -120,6 +120,10 @@ void Recorder::AddNewChannels() {
     Channel& channel = channels_[i];
     if (settings_.describe) channel.about = settings_.describe(channel.writer);
     channel.about["writer"] = Hex(channel.writer);
+    if (channel.topic != TopicId::kTissueFrame) continue;
+    const recording::PointCoding coding = TissueCoding(settings_.tissue_step_m);
+    recording::PutPointCoding(coding, &channel.about);
+    packer_.Code(static_cast<std::uint16_t>(i), coding);
   }
   if (file_) AddChannels(&*file_, first, &schemas_);
 }
@@ -128,9 +132,9 @@ void Recorder::AddChannels(recording::McapWriter* file, std::size_t first,
                            std::array<std::uint16_t, kTopicCount>* schemas) const {
   for (std::size_t i = first; i < channels_.size(); ++i) {
     const TopicId topic = channels_[i].topic;
-    const std::string type(bus::TopicLabel(topic));
+    const RecordedType type = RecordedTypeOf(topic);
     std::uint16_t& schema = (*schemas)[static_cast<std::size_t>(topic)];
-    if (schema == 0) schema = file->AddSchema("fulcrum::idl::" + type, "omgidl", bus::SchemaText(type));
+    if (schema == 0) schema = file->AddSchema("fulcrum::idl::" + type.name, "omgidl", type.idl);
     file->AddChannel(schema, bus::RoleOf(topic).name, "cdr", channels_[i].about);
   }
 }
@@ -155,22 +159,23 @@ void Recorder::Exchange(std::int64_t now_ns, bool all, const std::string& end) {
   {
     const std::lock_guard lock(mutex_);
     ended_ = ended_.empty() ? end : ended_;
-    const bool due =
-        filling_.used() >= recording::ChunkPacker::kChunkBytes || now_ns - filling_.begin_ns >= kLongestChunk_ns;
+    const bool due = filling_.small.used >= recording::ChunkPacker::kChunkBytes ||
+                     filling_.large.used >= recording::ChunkPacker::kCodedChunkBytes ||
+                     now_ns - filling_.begin_ns >= kLongestChunk_ns;
     if (filling_.used() == 0 || !(due || all)) return;
     std::swap(filling_, writing_);
   }
   AddNewChannels();
-  Pack(&writing_.large);
-  Pack(&writing_.small);
+  Pack(&writing_.large, recording::ChunkPacker::kCodedChunkBytes);
+  Pack(&writing_.small, recording::ChunkPacker::kChunkBytes);
 }
 
-void Recorder::Pack(Batch::Part* part) {
-  constexpr std::size_t kChunk = recording::ChunkPacker::kChunkBytes;
+void Recorder::Pack(Batch::Part* part, std::size_t chunk_B) {
   std::span<const std::uint8_t> records(part->bytes.get(), part->used);
   while (!records.empty()) {
     // A remainder of up to twice the size of a chunk is one chunk, so that no small one is left.
-    records = records.subspan(packer_.Pack(records, records.size() <= 2 * kChunk ? records.size() : kChunk, &packed_));
+    records =
+        records.subspan(packer_.Pack(records, records.size() <= 2 * chunk_B ? records.size() : chunk_B, &packed_));
     if (file_) Write();
     if (settings_.keep_s > 0) Keep();
   }

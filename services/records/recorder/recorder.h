@@ -34,6 +34,9 @@ struct RecorderSettings {
   std::size_t keep_B = std::size_t{1} << 30;  ///< Upper limit of that memory.
   /// Space that a recording leaves free on its disk [B]: it ends in order before.
   std::uint64_t keep_free_B = 500'000'000;
+  /// Positions of a TissueFrame are rounded to multiples of it [m]; 0: they are exact. A replay computes them again, so
+  /// they are for pictures and maps only.
+  float tissue_step_m = 2e-6F;
   std::string library;  ///< Name of the writing program: "fulcrum 0.1.0".
   /// Metadata of the session in the file, one record per entry.
   std::map<std::string, recording::TextMap> metadata;
@@ -74,7 +77,7 @@ class Recorder {
   void Receive(const bus::RawSample& sample, const std::function<bool()>& is_whole);
 
   // The following functions are for the writing thread only.
-  /// Writes the received samples once they fill ChunkPacker::kChunkBytes or are kLongestChunk_ns old. Ends the
+  /// Writes the received samples once they fill a chunk or are kLongestChunk_ns old. Ends the
   /// recording when its room is used up.
   void Flush(std::int64_t now_ns);
   /// Writes all received samples, and writes the last seconds that were kept into a file of its own. Throws InputError
@@ -123,7 +126,7 @@ class Recorder {
   };
 
   void AddNewChannels();
-  void Pack(Batch::Part* part);
+  void Pack(Batch::Part* part, std::size_t chunk_B);
   /// Why the recording must end now; empty: it has room.
   [[nodiscard]] std::string ReasonToEnd(std::int64_t now_ns);
   /// Exchanges the batches if the filled one is large or old enough for a chunk, or if `all`, and writes the filled

@@ -10,8 +10,7 @@
 namespace fulcrum::recorder {
 namespace {
 
-/// The rate is that of a span of this length: a chunk of frames is written every 50 ms, one of small topics every 500
-/// ms.
+/// The rate is that of a span of this length: chunks are written every 500 ms.
 constexpr std::int64_t kSpan_ns = 2 * kSecond_ns;
 /// Samples that do not compress, with their share of the indexes, in units of their size.
 constexpr double kGrowth = 1.25;

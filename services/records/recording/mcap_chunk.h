@@ -3,9 +3,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <span>
 #include <vector>
+
+#include "services/records/recording/point_coding.h"
 
 struct ZSTD_CCtx_s;
 
@@ -40,19 +43,28 @@ class ChunkPacker {
   ChunkPacker(const ChunkPacker&) = delete;
   ChunkPacker& operator=(const ChunkPacker&) = delete;
 
+  /// Codes the messages of a channel from now on. The first one of a chunk refers to no other, so each
+  /// chunk can be read alone.
+  void Code(std::uint16_t channel, const PointCoding& coding);
   /// Packs the first of these message records, as many as fit into `most` bytes but at least one. Returns their length
   /// [B].
   std::size_t Pack(std::span<const std::uint8_t> records, std::size_t most, PackedChunk* chunk);
 
   /// Size at which a chunk is ended [B].
   static constexpr std::size_t kChunkBytes = std::size_t{1} << 20;
+  /// The same where messages are coded, before they are: the first of each chunk takes as much as ten others.
+  static constexpr std::size_t kCodedChunkBytes = std::size_t{32} << 20;
 
  private:
   struct IndexEntry {
     std::uint64_t log_time_ns, offset;
   };
+  void Compress(std::span<const std::uint8_t> messages, PackedChunk* chunk);
+
   std::vector<std::uint8_t> packed_;
+  std::vector<std::uint8_t> coded_;             ///< The records with coded messages.
   std::vector<std::vector<IndexEntry>> index_;  ///< By channel.
+  std::map<std::uint16_t, PointCoder> coders_;
   ZSTD_CCtx_s* zstd_;
 };
 

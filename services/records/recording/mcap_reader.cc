@@ -162,6 +162,30 @@ void McapReader::OpenChunk(const Record& record) {
     return;
   }
   left_ = chunk_;
+  for (auto& [channel, coder] : coders_) coder.Restart();
+}
+
+void McapReader::TakeChannel(std::uint16_t number, const McapChannel& channel) {
+  if (const auto known = channels_.find(number); known != channels_.end()) {
+    if (known->second != channel) Fault("another channel " + std::to_string(number));
+    return;
+  }
+  if (const std::optional<PointCoding> coding = FindPointCoding(channel.metadata)) {
+    if (coders_.size() == kMostCoded) return Fault("more than 64 channels with coded messages");
+    coders_.emplace(number, *coding);
+  }
+  channels_.emplace(number, channel);
+}
+
+bool McapReader::Decode(McapMessage* message) {
+  const auto coder = coders_.find(message->channel);
+  if (coder == coders_.end()) return true;
+  if (!coder->second.Decode(message->data, &decoded_)) {
+    Fault("a message of " + channels_.at(message->channel).topic.substr(0, 64) + " cannot be decoded");
+    return false;
+  }
+  message->data = decoded_;
+  return true;
 }
 
 bool McapReader::Take(const Record& record, McapMessage* message) {
@@ -181,10 +205,8 @@ bool McapReader::Take(const Record& record, McapMessage* message) {
     }
     case Opcode::kChannel: {
       const auto number = from.Number<std::uint16_t>();
-      McapChannel channel{from.Number<std::uint16_t>(), from.Text(), from.Text(), from.Texts()};
-      if (from.good() && channels_.try_emplace(number, channel).first->second != channel) {
-        Fault("another channel " + std::to_string(number));
-      }
+      const McapChannel channel{from.Number<std::uint16_t>(), from.Text(), from.Text(), from.Texts()};
+      if (from.good()) TakeChannel(number, channel);
       break;
     }
     case Opcode::kMessage: {
@@ -194,9 +216,7 @@ bool McapReader::Take(const Record& record, McapMessage* message) {
         Fault("a message of an undefined channel: " + std::to_string(message->channel));
         return false;
       }
-      if (from.good()) {
-        return true;
-      }
+      if (from.good()) return Decode(message);
       break;
     }
     case Opcode::kMetadata: {

@@ -13,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "services/records/recording/point_coding.h"
+
 namespace fulcrum::recording {
 
 struct McapSchema {
@@ -40,7 +42,8 @@ struct McapFault {
 /// Reads the records in the order of the file and needs neither summary nor index, so a recording that was interrupted
 /// by a kill is readable up to its last complete chunk. A damaged record is skipped and listed in faults(), as is a
 /// schema or channel whose number stands for another one already. Chunks may be uncompressed or compressed with zstd.
-/// Records of unknown kind are skipped, as the format requires.
+/// Records of unknown kind are skipped, as the format requires. Coded messages (point_coding.h) are returned as they
+/// were before; after one that cannot be decoded, those that refer to it are faults, too.
 class McapReader {
  public:
   enum class Depth {
@@ -76,6 +79,8 @@ class McapReader {
 
   /// A chunk with a larger length counts as damaged.
   static constexpr std::uint64_t kMostChunkBytes = std::uint64_t{1} << 28;
+  /// Largest number of channels with coded messages: each keeps its last one.
+  static constexpr std::size_t kMostCoded = 64;
   /// Largest number of faults that are kept.
   static constexpr std::size_t kMostFaults = 100;
 
@@ -92,6 +97,9 @@ class McapReader {
   /// Processes a record. True if it is a message.
   bool Take(const Record& record, McapMessage* message);
   void OpenChunk(const Record& record);
+  void TakeChannel(std::uint16_t number, const McapChannel& channel);
+  /// Decodes the message if it is coded; false if that fails.
+  bool Decode(McapMessage* message);
   void Fault(std::string what);
 
   std::filesystem::path file_;
@@ -106,6 +114,8 @@ class McapReader {
   std::string profile_, library_;
   std::map<std::uint16_t, McapSchema> schemas_;
   std::map<std::uint16_t, McapChannel> channels_;
+  std::map<std::uint16_t, PointCoder> coders_;
+  std::vector<std::uint8_t> decoded_;
   std::map<std::string, std::map<std::string, std::string>> metadata_;
   std::vector<McapFault> faults_;
   bool closed_ = false, done_ = false, chunked_ = false;

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 #include <limits>
+#include <optional>
 
 #include "services/base/core/byte_stream.h"
 #include "services/base/core/error.h"
@@ -105,6 +106,7 @@ std::uint16_t McapWriter::AddChannel(std::uint16_t schema, std::string_view topi
   channels_.insert(channels_.end(), record_.begin(), record_.end());
   summary_B_ += record_.size() + kChannelCount_B;
   Put(record_);
+  if (const std::optional<PointCoding> coding = FindPointCoding(metadata)) packer_.Code(number, *coding);
   return number;
 }
 

@@ -32,7 +32,8 @@ class McapWriter {
 
   /// Adds a schema and returns its number, from 1.
   std::uint16_t AddSchema(std::string_view name, std::string_view encoding, std::string_view text);
-  /// Adds a channel and returns its number. @param schema 0: none.
+  /// Adds a channel and returns its number. With a point coding in its metadata (point_coding.h), its messages become
+  /// smaller in the file and are read as before, rounded to its step. @param schema 0: none.
   std::uint16_t AddChannel(std::uint16_t schema, std::string_view topic, std::string_view message_encoding,
                            const TextMap& metadata);
   void AddMetadata(std::string_view name, const TextMap& values);

@@ -3,6 +3,7 @@
 //   record.cpu_pct                  of one core, of the process, in the middle of a session of the built-in scene
 //   record.lost_samples             in that whole session, by the sequences in the file
 //   record.file_MB_per_s            rate at which that session writes
+//   record.GB_per_hour              the same of the scripted operation (20 s), of which all but the ends is motion
 //   record.readable_after_kill_pct  of the samples older than a second at kill -9 of the recorder, those in its file
 //   record.lost_at_kill_ms_max      at those kills, the age of the newest sample in the file
 //   record.busy.lost_samples        in a session beside two busy loops for each core, by the sequences in its file
@@ -129,6 +130,16 @@ bool Session(benchmark::Report* report) {
   return true;
 }
 
+/// Size of the scripted operation's recording, in an hour at that rate. False if the session failed to run.
+bool Moving(benchmark::Report* report) {
+  constexpr double kOperation_s = 20;
+  testing::Cart cart("built-in", kCartDomain, {"--record", "--seconds", std::to_string(kOperation_s)});
+  if (!cart.WaitForEnd(2 * kPatience_s)) return false;
+  const double size_B = static_cast<double>(fs::file_size(cart.session() / "recording.mcap"));
+  report->Add("record.GB_per_hour", 1e-9 * size_B * 3600 / kOperation_s, "GB");
+  return true;
+}
+
 void Kills(benchmark::Report* report) {
   testing::RecorderProbe probe(kProbeDomain);
   std::uint64_t due = 0, read = 0, missed = 0;
@@ -208,6 +219,10 @@ int Run(benchmark::Report* report) {
   if (report->Wants("guard.disk_full_lost_samples")) FullDisk(report);
   if (report->Wants("record.busy.lost_samples") && !BusySession(report)) {
     std::fprintf(stderr, "bench_recording: the session beside busy loops did not begin or end\n");
+    return 1;
+  }
+  if (report->Wants("record.GB_per_hour") && !Moving(report)) {
+    std::fprintf(stderr, "bench_recording: the scripted operation did not end\n");
     return 1;
   }
   for (const char* key : {"record.cpu_pct", "record.lost_samples", "record.samples", "record.file_MB_per_s"}) {

@@ -1,10 +1,13 @@
 // Any bytes as a recording: read, repaired, checked and printed as the tools of `fulcrum log` do. Checksums are removed
 // first (0 stands for none); otherwise checks beyond them would not be reached.
+#include <array>
 #include <cstring>
+#include <map>
 #include <sstream>
 
 #include "services/records/recording/mcap_format.h"
 #include "services/records/recording/mcap_writer.h"
+#include "services/records/recording/point_coding.h"
 #include "tests/fuzz/recording/recording_check.h"
 #include "tests/fuzz/target.h"
 #include "tests/unit/bus/samples.h"
@@ -54,6 +57,7 @@ class Recording final : public Target {
   if (std::optional<Seed> seed = SeedOf<T>(file, #T)) seeds.push_back(std::move(*seed));
     FULCRUM_MESSAGES(FULCRUM_SEED)
 #undef FULCRUM_SEED
+    seeds.push_back(CodedSeed(file));
     return seeds;
   }
 
@@ -72,6 +76,24 @@ class Recording final : public Target {
       for (std::uint32_t i = 1; i <= 2; ++i) writer.Write(channel, i, i, i, std::as_bytes(std::span(cdr)));
     }
     return Seed{name, ReadFile(file)};
+  }
+  /// Coded messages: a key, a difference, one relative to the neighbour, one as sent.
+  static Seed CodedSeed(const std::filesystem::path& file) {
+    std::map<std::string, std::string> metadata{{"node", "physics_node"}};
+    recording::PutPointCoding({.head_B = 4, .values = 6, .step = 2e-6F}, &metadata);
+    {
+      recording::McapWriter writer(file, "", "fuzz");
+      const auto channel =
+          writer.AddChannel(writer.AddSchema("TissueFrame", "omgidl", ""), "fulcrum/TissueFrame", "cdr", metadata);
+      const auto write = [&](std::uint32_t i, const std::array<float, 7>& words) {
+        writer.Write(channel, i, i, i, std::as_bytes(std::span(words)));
+      };
+      write(1, {1, 0.1F, 0.2F, 0, 0.11F, 0.2F, 0.01F});
+      write(2, {2, 0.1F, 0.2F, 0, 0.11F, 0.2F, 0.01002F});
+      write(3, {3, 0.101F, 0.201F, 0, 0.111F, 0.201F, 0.01F});
+      writer.Write(channel, 4, 4, 4, std::as_bytes(std::span(metadata.at("node"))));
+    }
+    return {"coded", ReadFile(file)};
   }
   void Print(const std::filesystem::path& file) const {
     constexpr std::size_t kLongestList = 8;

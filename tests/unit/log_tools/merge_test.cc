@@ -49,10 +49,10 @@ class Merging : public testing::Test {
     recorder.Close(0);
     return settings.file;
   }
-  /// Truncates a file as a kill does: within its last record.
+  /// Truncates a file as a kill does: within a record, before its summary.
   static void Kill(const fs::path& file) {
     recording::McapReader reader(file);
-    fs::resize_file(file, fs::file_size(file) * 9 / 10);
+    fs::resize_file(file, fs::file_size(file) / 2);
   }
   struct Content {
     std::map<std::string, std::vector<std::uint32_t>> sequences;

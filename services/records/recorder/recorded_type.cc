@@ -1,0 +1,44 @@
+#include "services/records/recorder/recorded_type.h"
+
+#include "services/transport/bus/schema.h"
+#include "services/transport/bus/topics.h"
+
+namespace fulcrum::recorder {
+namespace {
+
+/// For readers other than this project's; the meaning of the fields is in recording/point_coding.h.
+constexpr const char* kRecordedTissueFrame = R"(
+// A TissueFrame in a recording. Values are the residuals of x y z of each vertex, in multiples of step_m.
+module fulcrum {
+module idl {
+
+struct RecordedTissueFrame {
+  TissueFrameHeader header;
+  float step_m;                    // m; 0: words are the ordered bits of floats
+  unsigned long kind;              // 0 key, 1 difference from the frame before, 2 relative to the neighbour's, 3 as sent
+  unsigned long value_count;       // 3 * vertices; the rest of the frame's array is zero
+  sequence<octet> residuals;       // zigzag; low bytes of all values, then their second bytes, ...
+};
+
+};
+};
+)";
+
+/// The encapsulation of CDR in front of a message [B].
+constexpr std::size_t kEncapsulation_B = 4;
+/// TissueFrameHeader in CDR: the stamp (32), six numbers of 8 bytes, two of 4.
+constexpr std::size_t kTissueHeader_B = 32 + 6 * 8 + 2 * 4;
+
+}  // namespace
+
+RecordedType RecordedTypeOf(TopicId topic) {
+  const std::string type(bus::TopicLabel(topic));
+  if (topic != TopicId::kTissueFrame) return {type, bus::SchemaText(type)};
+  return {"RecordedTissueFrame", bus::SchemaText(type) + kRecordedTissueFrame};
+}
+
+recording::PointCoding TissueCoding(float step_m) {
+  return {.head_B = kEncapsulation_B + kTissueHeader_B, .values = std::size_t{3} * kMaxTissueVertices, .step = step_m};
+}
+
+}  // namespace fulcrum::recorder

@@ -1,0 +1,20 @@
+// Types of the messages in a file: those of the bus, but for TissueFrame.
+#pragma once
+
+#include <string>
+
+#include "services/base/core/messages.h"
+#include "services/records/recording/point_coding.h"
+
+namespace fulcrum::recorder {
+
+struct RecordedType {
+  std::string name;  ///< Without module.
+  std::string idl;   ///< With all types that it uses.
+};
+[[nodiscard]] RecordedType RecordedTypeOf(TopicId topic);
+
+/// @param step_m 0: positions are exact [m].
+[[nodiscard]] recording::PointCoding TissueCoding(float step_m);
+
+}  // namespace fulcrum::recorder

@@ -1,0 +1,81 @@
+// Coding of messages that hold an array of points, such as a TissueFrame: each message as its difference from the one
+// before it in the same chunk.
+//
+// A coded message:
+//
+//   head_B bytes   those of the message, unchanged
+//   float          step: a value is a multiple of it; 0: values are exact
+//   uint32         kind: 0 key, 1 difference, 2 difference relative to the neighbour, 3 as sent
+//   uint32         number of values; the others of the array are zero
+//   uint32         length of what follows [B]
+//   bytes          residuals: the low byte of each, then the second byte of each, … as many as the largest needs
+//
+// A word is value / step, rounded, or for exact values the bits of the float in an order without a jump at zero. The
+// residual of word i, modulo 2^32 and as zigzag (0, -1, 1, -2, … become 0, 1, 2, 3, …), with p the words of the message
+// before and the value three places before i, the neighbour's same coordinate, counted as 0 for the first point:
+//
+//   key            w[i] - w[i-3]
+//   difference     w[i] - p[i]
+//   neighbour      (w[i] - p[i]) - (w[i-3] - p[i-3])
+//
+// As sent: the bytes are the whole message, which has another length than the coding expects.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace fulcrum::recording {
+
+/// How a channel's messages are coded. It is kept in the metadata of the channel.
+struct PointCoding {
+  std::size_t head_B = 0;  ///< Length of what precedes the array, with the encapsulation of CDR.
+  std::size_t values = 0;  ///< Length of the array of float; the message ends with it.
+  float step = 0;          ///< Values are rounded to multiples of it; 0: they are exact.
+
+  [[nodiscard]] std::size_t message_B() const { return head_B + sizeof(float) * values; }
+  [[nodiscard]] bool operator==(const PointCoding&) const = default;
+
+  static constexpr std::size_t kMostHead_B = 4096;
+  static constexpr float kMostStep = 1;
+  static constexpr std::size_t kMostValues = std::size_t{1} << 18;
+};
+
+void PutPointCoding(const PointCoding& coding, std::map<std::string, std::string>* metadata);
+/// The coding of a channel with this metadata; nothing if it has none, or one that is out of range.
+[[nodiscard]] std::optional<PointCoding> FindPointCoding(const std::map<std::string, std::string>& metadata);
+
+/// What the value becomes in a recording with this step. A rounded value stays the same when it is rounded again.
+[[nodiscard]] float RoundedTo(float step, float value);
+
+/// Codes or decodes the messages of one channel, in their order. Allocates nothing once the buffers have grown.
+class PointCoder {
+ public:
+  explicit PointCoder(const PointCoding& coding) : coding_(coding) {}
+
+  /// The next message begins a chunk: it does not refer to the one before it.
+  void Restart() { last_.clear(); }
+  /// Appends a message in coded form. Any bytes are accepted: what is not a message of this coding is kept as sent, and
+  /// a message with values that are not finite, or too large for the step, is kept exactly.
+  void Encode(std::span<const std::uint8_t> message, std::vector<std::uint8_t>* coded);
+  /// The reverse. False if the bytes are no coded message, or refer to a message before that was not decoded.
+  [[nodiscard]] bool Decode(std::span<const std::uint8_t> coded, std::vector<std::uint8_t>* message);
+
+ private:
+  /// Fills `words_` from the array; returns the step that applies.
+  float TakeWords(std::span<const std::uint8_t> array);
+  /// The kind of residuals that takes fewer bytes.
+  [[nodiscard]] std::uint32_t Choose() const;
+  /// Fills `residuals_`; returns the bits that any of them has.
+  std::uint32_t Predict(std::uint32_t kind);
+
+  const PointCoding coding_;
+  std::vector<std::uint32_t> words_, last_, residuals_;  ///< `last_`: of the message before; empty: none.
+  float last_step_ = 0;
+};
+
+}  // namespace fulcrum::recording
