@@ -1,6 +1,8 @@
 // haptics_node: the 1 kHz servo between the operator's hands and the tissue.
 #include <algorithm>
+#include <chrono>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "haptics_node/calibrate_command.h"
@@ -17,6 +19,8 @@ using fulcrum::Tick;
 
 // The bus thread runs below the servo, above the nodes at 100 Hz.
 constexpr int kPriorityBelowServo = 20;
+/// At rest it passes over three periods.
+constexpr std::chrono::milliseconds kRest(3);
 
 fulcrum::ExitCode RunHaptics(fulcrum::app::NodeApp& app) {
   fulcrum::haptics::CartDevices cart =
@@ -34,7 +38,10 @@ fulcrum::ExitCode RunHaptics(fulcrum::app::NodeApp& app) {
   below.fifo_priority = std::max(0, servo.fifo_priority - kPriorityBelowServo);
   below.spin_ns = 0;
   below.cpu = -1;
-  fulcrum::runtime::CyclicThread bus(below, [&](const Tick&) { node.BusStep(); });
+  fulcrum::runtime::CyclicThread bus(below, [&](const Tick&) {
+    node.BusStep();
+    if (node.rests()) std::this_thread::sleep_for(kRest);
+  });
   bus.Start();
   return app.Run(
       servo, [&](const Tick& tick) { node.ServoStep(tick); },

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "haptics_node/device/simulated_device.h"
+#include "services/base/runtime/quantiles.h"
 #include "services/transport/bus/gate.h"
 
 namespace fulcrum::haptics {
@@ -77,7 +78,10 @@ void HapticsNode::ServoStep(const Tick& tick) noexcept {
   }
   servo_.Step(tick);
   tick_.servo = servo_.record();
-  figures_.Store(servo_.figures());
+  const ServoFigures& figures = servo_.figures();
+  if (figures.models_used != models_used_) motion_to_force_.Add(figures.motion_to_force_ns);
+  models_used_ = figures.models_used;
+  figures_.Store(figures);
   if (!from_servo_.TryPush(tick_)) records_lost_.fetch_add(1, std::memory_order_relaxed);
 }
 
@@ -91,6 +95,13 @@ void HapticsNode::BusStep() {
     }
   }
   while (from_servo_.TryPop(&record_)) Publish(record_);
+}
+
+bool HapticsNode::rests() const {
+  constexpr std::size_t kSettled_ticks = 100;
+  return thinner_.still_ticks() >= kSettled_ticks &&
+         std::all_of(received_.devices.begin(), received_.devices.end(),
+                     [](const DeviceContacts& device) { return device.count == 0; });
 }
 
 void HapticsNode::Publish(const TickRecord& tick) {
@@ -122,6 +133,7 @@ void HapticsNode::FillHealth(Health* health) const {
     if (devices_[i]) metric("hand_force" + std::to_string(i) + "_N", figures.force_N[i]);
   }
   metric("model_age_ms", 1e3 * figures.model_age_s);
+  runtime::AddQuantiles("motion_to_force", motion_to_force_.snapshot(), health);
   metric("models_dropped", static_cast<double>(figures.models_dropped));
   metric("models_not_taken", static_cast<double>(models_not_taken_.load(std::memory_order_relaxed)));
   metric("inputs_not_taken", static_cast<double>(inputs_not_taken_.load(std::memory_order_relaxed)));

@@ -14,6 +14,7 @@
 #include "services/base/core/operator_choice.h"
 #include "services/base/core/scene_view.h"
 #include "services/base/core/tick.h"
+#include "services/base/runtime/histogram.h"
 #include "services/base/runtime/seqlock.h"
 #include "services/base/runtime/spsc_ring.h"
 #include "services/transport/bus/port.h"
@@ -46,6 +47,10 @@ class HapticsNode {
   /// before and after ServoStep() on one thread.
   void BusStep();
 
+  /// No tool has moved for a tenth of a second and none is near tissue: BusStep() is early enough each few
+  /// milliseconds. Bus thread.
+  [[nodiscard]] bool rests() const;
+
   /// State hash of the servo after the newest tick that BusStep() has published. Bus thread.
   [[nodiscard]] std::uint64_t state_hash() const { return record_.servo.state_hash; }
 
@@ -75,12 +80,14 @@ class HapticsNode {
   runtime::SpscRing<OperatorInput, 8> inputs_to_servo_;
   runtime::SpscRing<TickRecord, 256> from_servo_;
   runtime::SeqLock<ServoFigures> figures_;
+  runtime::Histogram motion_to_force_;
   std::atomic<std::uint64_t> models_not_taken_{0}, inputs_not_taken_{0}, records_lost_{0};
 
   // Servo thread only.
   ContactModel arrived_;
   OperatorInput input_;
   TickRecord tick_;
+  std::uint64_t models_used_ = 0;
   // Bus thread only.
   ContactModel received_;
   OperatorInput received_input_;

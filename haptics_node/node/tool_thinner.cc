@@ -60,9 +60,11 @@ const ToolThinner::Due& ToolThinner::Add(const ToolState& tools, double session_
   if (rested && Each(tools, published_, Same)) {
     between_[count_++] = tools;
     ++rest_ticks_;
+    ++still_ticks_;
     if (count_ == kMostTicks) Publish(tools);
     return due_;
   }
+  still_ticks_ = 0;
   // A rest ends with its last tick, a way that is straight with the last tick that lies on it.
   const ToolState newest = count_ > 0 ? between_[count_ - 1] : published_;
   if (count_ > 0 && (rested || !Each(tools, newest, SameKind) || !Fits(tools))) Publish(newest);

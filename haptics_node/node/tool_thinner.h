@@ -28,6 +28,8 @@ class ToolThinner {
   /// Adds the tools of the next tick. Returns what is to be published now. Stamps keep their time; epoch and sequence
   /// are the publisher's.
   const Due& Add(const ToolState& tools, double session_time_s);
+  /// Newest ticks in which nothing has changed.
+  [[nodiscard]] std::size_t still_ticks() const { return still_ticks_; }
 
  private:
   [[nodiscard]] bool IsAsked(double session_time_s);
@@ -41,6 +43,7 @@ class ToolThinner {
   std::array<ToolState, kMostTicks> between_;  ///< Of the ticks since, oldest first.
   std::size_t count_ = 0;                      ///< Of these.
   std::size_t rest_ticks_ = 0;                 ///< Ticks since, all of them like the published one.
+  std::size_t still_ticks_ = 0;
   Due due_;
 };
 

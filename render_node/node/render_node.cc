@@ -13,6 +13,7 @@
 #include "services/base/core/contact_force.h"
 #include "services/base/core/generator_inputs.h"
 #include "services/base/runtime/cyclic_thread.h"
+#include "services/base/runtime/quantiles.h"
 
 namespace fulcrum::render {
 namespace {
@@ -447,8 +448,17 @@ void RenderNode::Draw(double session_time_s, bool write_png) {
   frames_drawn_.fetch_add(1, std::memory_order_relaxed);
   const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
   quality_.Add(spent.count());
+  NoteLatency(spent.count());
   draw_ms_.store(spent.count(), std::memory_order_relaxed);
   scale_.store(quality_.scale(), std::memory_order_relaxed);
+}
+
+/// Of a picture that shows a new shape of the tissue: the age of the step that made it, when the picture is drawn.
+void RenderNode::NoteLatency(double draw_ms) {
+  const TissueFrameHeader& tissue = tissue_.header;
+  if (std::exchange(drawn_tissue_, tissue.stamp.sequence) == tissue.stamp.sequence) return;
+  const double age_s = session_time_s_ - tissue.session_time_s + 1e-3 * draw_ms;
+  motion_to_picture_.Add(std::llround(1e9 * age_s));
 }
 
 void RenderNode::Report(const std::string& error) {
@@ -462,6 +472,7 @@ void RenderNode::FillHealth(Health* health) const {
   health->metrics.push_back({"png_failed", static_cast<double>(writer_.failed())});
   health->metrics.push_back({"png_dropped", static_cast<double>(pictures_dropped_.load(std::memory_order_relaxed))});
   health->metrics.push_back({"draw_ms", draw_ms_.load(std::memory_order_relaxed)});
+  runtime::AddQuantiles("motion_to_picture", motion_to_picture_.snapshot(), health);
   health->metrics.push_back({"scale", scale_.load(std::memory_order_relaxed)});
   health->metrics.push_back({"patches", static_cast<double>(patches_applied_.load(std::memory_order_relaxed))});
   std::string error = writer_.last_error();

@@ -19,6 +19,7 @@
 #include "render_node/offscreen/png_writer.h"
 #include "services/base/core/lens.h"
 #include "services/base/core/tick.h"
+#include "services/base/runtime/histogram.h"
 #include "services/transport/bus/input_account.h"
 #include "services/transport/bus/port.h"
 
@@ -110,6 +111,7 @@ class RenderNode {
   [[nodiscard]] bool Recent(double time_s) const;
   void UpdateTexts();
   void Draw(double session_time_s, bool write_png);
+  void NoteLatency(double draw_ms);
   void Report(const std::string& error);
 
   SceneView scene_;
@@ -159,12 +161,14 @@ class RenderNode {
   std::array<bool, 2> injured_{};               // … and whether one was an injury.
   bool changed_on_screen_ = false;              // Since the last picture that was drawn.
   bool changed_in_file_ = false;                // Since the last picture that was written.
+  std::uint64_t drawn_tissue_ = 0;              // Sequence of the TissueFrame in the last picture.
 
   // Read by the health thread; the values are independent, so relaxed order is enough.
   std::atomic<std::uint64_t> frames_drawn_{0};
   std::atomic<std::uint64_t> pictures_dropped_{0};
   std::atomic<std::uint64_t> patches_applied_{0};
   std::atomic<double> draw_ms_{0};
+  runtime::Histogram motion_to_picture_;
   std::atomic<double> scale_{1};
   mutable std::mutex error_mutex_;
   std::string error_;

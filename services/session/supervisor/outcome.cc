@@ -53,6 +53,10 @@ std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
                                 Source{kThermal, "warnings", "warnings", "", 0},
                                 Source{kThermal, "injuries", "injuries", "", 0},
                                 Source{kPhysics, "quarantined", "particles quarantined", "", 0},
+                                Source{kHaptics, "motion_to_force_p50_ms", "motion to force, median", "ms", 1, true},
+                                Source{kHaptics, "motion_to_force_p99_ms", "motion to force, 99 %", "ms", 1, true},
+                                Source{kRender, "motion_to_picture_p50_ms", "motion to picture, median", "ms", 0, true},
+                                Source{kRender, "motion_to_picture_p95_ms", "motion to picture, 95 %", "ms", 0, true},
                                 Source{kRender, "png_written", "pictures", "", 0}};
   std::vector<KeyFigure> figures;
   for (const Source& source : kSources) {

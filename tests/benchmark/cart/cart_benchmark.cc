@@ -3,12 +3,15 @@
 // the session adds to a step.
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <initializer_list>
 #include <limits>
 #include <map>
 #include <optional>
@@ -22,6 +25,7 @@
 #include "tests/benchmark/report.h"
 #include "tests/support/cart.h"
 #include "tests/support/mouse_operator.h"
+#include "tests/support/session_bus.h"
 
 namespace fulcrum {
 namespace {
@@ -135,6 +139,33 @@ bool Work(Report* report) {
   return true;
 }
 
+/// The operation with a reader of live pictures, as the console's page is: the way from a motion to force and picture.
+bool Live(Report* report) {
+  const int seconds = report->quick() ? 12 : 20;
+  testing::Cart cart("built-in", kDomain, {"--record", "--seconds", std::to_string(seconds)});
+  if (!testing::WaitFor(kPatience_s, [&] { return cart.PictureTime() > 4; })) return false;
+  {
+    bus::DdsParticipant participant(testing::ReaderOf(kDomain, "watch"));
+    std::atomic<int> pictures{0};
+    const auto reader = participant.MakeInput<Picture>([&pictures] { ++pictures; });
+    constexpr auto kSettle = std::chrono::seconds(1);
+    std::this_thread::sleep_for(kSettle);
+    const int before = pictures;
+    constexpr double kWatched_s = 5;
+    std::this_thread::sleep_for(std::chrono::duration<double>(kWatched_s));
+    report->Add("cart.live_pictures_per_s", (pictures - before) / kWatched_s, "1/s");
+    if (!cart.WaitForEnd(kPatience_s)) return false;
+  }
+  const std::string summary = testing::ReadFile(cart.session() / "summary.json");
+  for (const char* name :
+       {"motion_to_force_p50_ms", "motion_to_force_p99_ms", "motion_to_picture_p50_ms", "motion_to_picture_p95_ms"}) {
+    const std::string key = name;
+    const std::size_t at = key.rfind("_p");  // The key has the unit before the quantile.
+    report->Add("cart." + key.substr(0, at) + "_ms" + key.substr(at, 4), testing::FigureOf(summary, key), "ms");
+  }
+  return true;
+}
+
 /// Nothing touches the tissue: what the cart takes from the machine while it waits.
 bool Idle(Report* report) {
   const fs::path yaml = fs::temp_directory_path() / ("bench_cart_idle." + std::to_string(::getpid()) + ".yaml");
@@ -161,8 +192,14 @@ bool Idle(Report* report) {
 
 int main(int argc, char** argv) {
   fulcrum::benchmark::Report report(argc, argv);
-  const bool idle = report.Wants("cart.idle_cpu_pct"), work = report.Wants("cart.");
-  if ((idle && !fulcrum::Idle(&report)) || (work && !fulcrum::Work(&report))) {
+  const auto wants = [&report](std::initializer_list<const char*> stems) {
+    return std::any_of(stems.begin(), stems.end(), [&report](const char* stem) { return report.Wants(stem); });
+  };
+  const bool idle = wants({"cart.idle_cpu_pct", "cart.pictures_drawn_at_rest"});
+  const bool work = wants({"cart.cpu_pct", "cart.physics", "cart.thermal", "cart.haptics", "cart.render",
+                           "cart.pictures_per_s", "cart.recording_MB_per_s"});
+  const bool live = wants({"cart.live_pictures_per_s", "cart.motion_to_force_ms", "cart.motion_to_picture_ms"});
+  if ((idle && !fulcrum::Idle(&report)) || (work && !fulcrum::Work(&report)) || (live && !fulcrum::Live(&report))) {
     std::fprintf(stderr, "bench_cart: the session did not begin or end\n");
     return 1;
   }

@@ -166,6 +166,49 @@ TEST_F(HapticsNodeTest, HealthTellsForcesAndThatPhysicsIsGone) {
   EXPECT_GE(metric(later, "peak_hand_force_N"), metric(health, "peak_hand_force_N"));
 }
 
+TEST_F(HapticsNodeTest, HealthTellsHowOldThePoseBehindAForceIs) {
+  for (int i = 0; i < 1000; ++i) Step();
+  Health health;
+  node->FillHealth(&health);
+  std::vector<double> told_ms;
+  for (const Metric& metric : health.metrics) {
+    if (metric.name.starts_with("motion_to_force_")) told_ms.push_back(metric.value);
+  }
+  ASSERT_EQ(told_ms.size(), 3u);
+  EXPECT_TRUE(std::is_sorted(told_ms.begin(), told_ms.end()));
+  const double delay_ms = 1e-6 * static_cast<double>(physics.latency_ns);
+  EXPECT_GE(told_ms.front(), delay_ms);
+  EXPECT_LE(told_ms.back(), delay_ms + 3);
+}
+
+TEST_F(HapticsNodeTest, RestsWhileNothingMovesAndNothingIsNear) {
+  const Vec3f place(0, 0, 0.02f);
+  const std::array<ScriptKey, 3> late{
+      {{0.0f, 0, place, 0, 0, 0}, {0.5f, 0, place, 0, 0, 0}, {1.0f, 0, {0, 0, 0.01f}, 0, 0, 0}}};
+  scene.script = late;
+  node = Make(1000);
+  std::vector<std::uint64_t> rested;
+  for (std::uint64_t ms = 0; ms < 700; ++ms) {
+    if (ms == 400 || ms == 410) {
+      ContactModel model;
+      model.stamp = {ms, 1, TickAt(ms - 1).stamp_ns};
+      model.tool_stamp_ns = TickAt(ms - 1).stamp_ns;
+      model.physics_dt_s = 0.01f;
+      model.devices[0].count = ms == 400 ? 1 : 0;
+      bus.model_out->Write(model);
+    }
+    node->BusStep();
+    node->ServoStep(TickAt(ms));
+    node->BusStep();
+    if (node->rests()) rested.push_back(ms);
+  }
+  ASSERT_FALSE(rested.empty());
+  EXPECT_GE(rested.front(), 100u);
+  EXPECT_LT(rested.back(), 502u) << "it moves";
+  EXPECT_EQ(std::count_if(rested.begin(), rested.end(), [](std::uint64_t ms) { return ms >= 400 && ms < 410; }), 0);
+  EXPECT_GT(rested.size(), 350u);
+}
+
 TEST_F(HapticsNodeTest, WhatDoesNotPassTheGateIsCounted) {
   for (int i = 0; i < 50; ++i) Step();
   physics.stalled = true;
