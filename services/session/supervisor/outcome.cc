@@ -37,30 +37,33 @@ std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
     const char *key, *label, *unit;
     int decimals;
     bool at_end = false;  ///< The last value instead of the highest: a slit that is still short has larger deviations.
+    bool if_any = false;  ///< Only if it was reported.
   };
-  constexpr std::array kSources{Source{kPhysics, "peak_force_N", "peak force", "N", 2},
-                                Source{kHaptics, "peak_hand_force_N", "peak hand force", "N", 2},
-                                Source{kThermal, "highest_temperature_C", "highest temperature", "°C", 0},
-                                Source{kThermal, "cut_length_mm", "cut length", "mm", 1},
-                                Source{kThermal, "cut_width_p50_mm", "width of the slit, median", "mm", 2, true},
-                                Source{kThermal, "cut_off_way_mm", "slit off the metal's way, 95 %", "mm", 2, true},
-                                Source{kThermal, "hook_temperature_C", "highest temperature of the hook", "°C", 0},
-                                Source{kPhysics, "max_displacement_mm", "largest displacement", "mm", 1},
-                                Source{kPhysics, "largest_stretch", "largest stretch of the membrane", "", 2},
-                                Source{kPhysics, "torn_edges", "membrane edges torn", "", 0},
-                                Source{kPhysics, "grasped_particles", "particles grasped at most", "", 0},
-                                Source{kThermal, "dead_edges", "membrane edges severed", "", 0},
-                                Source{kThermal, "warnings", "warnings", "", 0},
-                                Source{kThermal, "injuries", "injuries", "", 0},
-                                Source{kPhysics, "quarantined", "particles quarantined", "", 0},
-                                Source{kHaptics, "motion_to_force_p50_ms", "motion to force, median", "ms", 1, true},
-                                Source{kHaptics, "motion_to_force_p99_ms", "motion to force, 99 %", "ms", 1, true},
-                                Source{kRender, "motion_to_picture_p50_ms", "motion to picture, median", "ms", 0, true},
-                                Source{kRender, "motion_to_picture_p95_ms", "motion to picture, 95 %", "ms", 0, true},
-                                Source{kRender, "png_written", "pictures", "", 0}};
+  constexpr std::array kSources{
+      Source{kPhysics, "peak_force_N", "peak force", "N", 2},
+      Source{kHaptics, "peak_hand_force_N", "peak hand force", "N", 2},
+      Source{kThermal, "highest_temperature_C", "highest temperature", "°C", 0},
+      Source{kThermal, "cut_length_mm", "cut length", "mm", 1},
+      Source{kThermal, "cut_width_p50_mm", "width of the slit, median", "mm", 2, true},
+      Source{kThermal, "cut_off_way_mm", "slit off the metal's way, 95 %", "mm", 2, true},
+      Source{kThermal, "hook_temperature_C", "highest temperature of the hook", "°C", 0},
+      Source{kPhysics, "max_displacement_mm", "largest displacement", "mm", 1},
+      Source{kPhysics, "largest_stretch", "largest stretch of the membrane", "", 2},
+      Source{kPhysics, "torn_edges", "membrane edges torn", "", 0},
+      Source{kPhysics, "grasped_particles", "particles grasped at most", "", 0},
+      Source{kThermal, "dead_edges", "membrane edges severed", "", 0},
+      Source{kThermal, "warnings", "warnings", "", 0},
+      Source{kThermal, "injuries", "injuries", "", 0},
+      Source{kPhysics, "quarantined", "particles quarantined", "", 0},
+      Source{kHaptics, "motion_to_force_p50_ms", "motion to force, median", "ms", 1, true, true},
+      Source{kHaptics, "motion_to_force_p99_ms", "motion to force, 99 %", "ms", 1, true, true},
+      Source{kRender, "motion_to_picture_p50_ms", "motion to picture, median", "ms", 0, true, true},
+      Source{kRender, "motion_to_picture_p95_ms", "motion to picture, 95 %", "ms", 0, true, true},
+      Source{kRender, "png_written", "pictures", "", 0}};
   std::vector<KeyFigure> figures;
   for (const Source& source : kSources) {
     if (!record.node(source.node).seen) continue;  // A scene without thermal_node has no temperature, rather than 0.
+    if (source.if_any && record.curve(source.key).points().empty()) continue;
     figures.push_back({source.key, source.label, source.unit, source.decimals,
                        source.at_end ? record.last(source.key) : record.peak(source.key)});
   }

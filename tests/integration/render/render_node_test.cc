@@ -145,6 +145,31 @@ TEST_F(RenderNodeTest, ShowsTheForceOfTheTissueAndNotThatOnTheHand) {
   EXPECT_EQ(Metric(*node, "frames_drawn"), drawn + 1) << "the figure has changed";
 }
 
+TEST_F(RenderNodeTest, TellsHowOldTheShapeInALivePictureIs) {
+  const auto node = MakeNode();
+  const auto told = [&node] {
+    Health health;
+    node->FillHealth(&health);
+    return std::count_if(health.metrics.begin(), health.metrics.end(),
+                         [](const auto& metric) { return metric.name.starts_with("motion_to_picture_"); });
+  };
+  SyntheticMoment moment = MakeSyntheticMoment(view_, 1.0);
+  moment.tissue.header.session_time_s = 0.5;
+  Publish(moment);
+  node->Step(At(1.0));
+  EXPECT_EQ(Metric(*node, "frames_drawn"), 1);
+  EXPECT_EQ(told(), 0) << "nobody watches";
+  const auto reader = bus_.pictures.MakeInput();
+  moment = MakeSyntheticMoment(view_, 1.2);
+  moment.tissue.header.session_time_s = 1.15;
+  Publish(moment);
+  node->Step(At(1.2));
+  EXPECT_EQ(told(), 3);
+  const double median_ms = Metric(*node, "motion_to_picture_p50_ms");
+  EXPECT_GE(median_ms, 50 + Metric(*node, "draw_ms") - 1);
+  EXPECT_LE(median_ms, 1.07 * (50 + Metric(*node, "draw_ms")) + 1) << "a bin of the histogram is 6 % wide";
+}
+
 TEST_F(RenderNodeTest, SendsEachChangeWhilePicturesAreReadAndNoneOtherwise) {
   const auto node = MakeNode();
   Publish(MakeSyntheticMoment(view_, 1.0));
