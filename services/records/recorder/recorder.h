@@ -77,8 +77,8 @@ class Recorder {
   void Receive(const bus::RawSample& sample, const std::function<bool()>& is_whole);
 
   // The following functions are for the writing thread only.
-  /// Writes the received samples once they fill a chunk or are kLongestChunk_ns old. Ends the
-  /// recording when its room is used up.
+  /// Writes the received samples once they fill a chunk or are kLongestChunk_ns old. Ends the recording when its room
+  /// is used up.
   void Flush(std::int64_t now_ns);
   /// Writes all received samples, and writes the last seconds that were kept into a file of its own. Throws InputError
   /// if that is not possible.

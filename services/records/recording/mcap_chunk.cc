@@ -37,12 +37,12 @@ ChunkPacker::ChunkPacker() : zstd_(ZSTD_createCCtx()) {}
 
 ChunkPacker::~ChunkPacker() { ZSTD_freeCCtx(zstd_); }
 
-void ChunkPacker::Code(std::uint16_t channel, const PointCoding& coding) { coders_.emplace(channel, coding); }
+void ChunkPacker::Code(std::uint16_t channel, const PointCoding& coding) { coders_.Add(channel, coding); }
 
 std::size_t ChunkPacker::Pack(std::span<const std::uint8_t> records, std::size_t most, PackedChunk* chunk) {
   std::size_t length = 0;
   coded_.clear();
-  for (auto& [channel, coder] : coders_) coder.Restart();
+  coders_.BeginChunk();
   chunk->first_ns = std::numeric_limits<std::uint64_t>::max();
   chunk->last_ns = 0;
   while (length < records.size()) {
@@ -59,10 +59,10 @@ std::size_t ChunkPacker::Pack(std::span<const std::uint8_t> records, std::size_t
     index_[channel].push_back({log_time_ns, coders_.empty() ? length : coded_.size()});
     chunk->first_ns = std::min(chunk->first_ns, log_time_ns);
     chunk->last_ns = std::max(chunk->last_ns, log_time_ns);
-    if (const auto coder = coders_.find(channel); coder != coders_.end()) {
+    if (coders_.Has(channel)) {
       const std::size_t at = coded_.size();
       coded_.resize(at + kMessageHead);
-      coder->second.Encode(record.subspan(kMessageHead), &coded_);
+      coders_.Of(channel, std::numeric_limits<std::size_t>::max())->Encode(record.subspan(kMessageHead), &coded_);
       PutMessageHead(channel, sequence, log_time_ns, publish_time_ns, coded_.size() - at - kMessageHead,
                      coded_.data() + at);
     } else if (!coders_.empty()) {

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <span>
 #include <vector>
@@ -64,7 +63,7 @@ class ChunkPacker {
   std::vector<std::uint8_t> packed_;
   std::vector<std::uint8_t> coded_;             ///< The records with coded messages.
   std::vector<std::vector<IndexEntry>> index_;  ///< By channel.
-  std::map<std::uint16_t, PointCoder> coders_;
+  PointCoders coders_;
   ZSTD_CCtx_s* zstd_;
 };
 

@@ -162,7 +162,7 @@ void McapReader::OpenChunk(const Record& record) {
     return;
   }
   left_ = chunk_;
-  for (auto& [channel, coder] : coders_) coder.Restart();
+  coders_.BeginChunk();
 }
 
 void McapReader::TakeChannel(std::uint16_t number, const McapChannel& channel) {
@@ -170,17 +170,14 @@ void McapReader::TakeChannel(std::uint16_t number, const McapChannel& channel) {
     if (known->second != channel) Fault("another channel " + std::to_string(number));
     return;
   }
-  if (const std::optional<PointCoding> coding = FindPointCoding(channel.metadata)) {
-    if (coders_.size() == kMostCoded) return Fault("more than 64 channels with coded messages");
-    coders_.emplace(number, *coding);
-  }
   channels_.emplace(number, channel);
+  if (const std::optional<PointCoding> coding = FindPointCoding(channel.metadata)) coders_.Add(number, *coding);
 }
 
 bool McapReader::Decode(McapMessage* message) {
-  const auto coder = coders_.find(message->channel);
-  if (coder == coders_.end()) return true;
-  if (!coder->second.Decode(message->data, &decoded_)) {
+  if (!coders_.Has(message->channel)) return true;
+  PointCoder* const coder = coders_.Of(message->channel, kMostCoded);
+  if (coder == nullptr || !coder->Decode(message->data, &decoded_)) {
     Fault("a message of " + channels_.at(message->channel).topic.substr(0, 64) + " cannot be decoded");
     return false;
   }

@@ -79,7 +79,7 @@ class McapReader {
 
   /// A chunk with a larger length counts as damaged.
   static constexpr std::uint64_t kMostChunkBytes = std::uint64_t{1} << 28;
-  /// Largest number of channels with coded messages: each keeps its last one.
+  /// Largest number of channels with coded messages in a chunk: each keeps its last one.
   static constexpr std::size_t kMostCoded = 64;
   /// Largest number of faults that are kept.
   static constexpr std::size_t kMostFaults = 100;
@@ -114,7 +114,7 @@ class McapReader {
   std::string profile_, library_;
   std::map<std::uint16_t, McapSchema> schemas_;
   std::map<std::uint16_t, McapChannel> channels_;
-  std::map<std::uint16_t, PointCoder> coders_;
+  PointCoders coders_;
   std::vector<std::uint8_t> decoded_;
   std::map<std::string, std::map<std::string, std::string>> metadata_;
   std::vector<McapFault> faults_;

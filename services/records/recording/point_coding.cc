@@ -208,4 +208,22 @@ bool PointCoder::Decode(std::span<const std::uint8_t> coded, std::vector<std::ui
   return true;
 }
 
+void PointCoders::BeginChunk() {
+  std::erase_if(coders_, [](const auto& entry) { return !entry.second.used; });
+  for (auto& [channel, entry] : coders_) {
+    entry.coder.Restart();
+    entry.used = false;
+  }
+}
+
+PointCoder* PointCoders::Of(std::uint16_t channel, std::size_t most) {
+  auto found = coders_.find(channel);
+  if (found == coders_.end()) {
+    if (coders_.size() >= most) return nullptr;
+    found = coders_.emplace(channel, Entry{PointCoder(codings_.at(channel))}).first;
+  }
+  found->second.used = true;
+  return &found->second.coder;
+}
+
 }  // namespace fulcrum::recording

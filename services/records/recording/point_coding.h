@@ -78,4 +78,24 @@ class PointCoder {
   float last_step_ = 0;
 };
 
+/// The coders of a file's channels, of which only those are kept that the present chunk or the one before needs: each
+/// restart of a node makes another channel.
+class PointCoders {
+ public:
+  void Add(std::uint16_t channel, const PointCoding& coding) { codings_.emplace(channel, coding); }
+  [[nodiscard]] bool empty() const { return codings_.empty(); }
+  [[nodiscard]] bool Has(std::uint16_t channel) const { return codings_.contains(channel); }
+  void BeginChunk();
+  /// Of a channel that Has(). Null if the chunk needs more than `most`.
+  [[nodiscard]] PointCoder* Of(std::uint16_t channel, std::size_t most);
+
+ private:
+  struct Entry {
+    PointCoder coder;
+    bool used = false;  ///< In the present chunk.
+  };
+  std::map<std::uint16_t, PointCoding> codings_;
+  std::map<std::uint16_t, Entry> coders_;
+};
+
 }  // namespace fulcrum::recording

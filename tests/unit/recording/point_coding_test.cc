@@ -174,6 +174,37 @@ TEST(PointCoding, MetadataSayItAll) {
   }
 }
 
+/// Each restart of a node makes a channel.
+TEST(PointCoding, AFileMayHaveAnyNumberOfCodedChannels) {
+  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / ("many_" + std::to_string(getpid()));
+  std::map<std::string, std::string> metadata;
+  PutPointCoding({kHead_B, kValues, kStep}, &metadata);
+  std::mt19937 random(1);
+  constexpr std::uint32_t kWriters = 3 * McapReader::kMostCoded;
+  {
+    McapWriter writer(file, "", "");
+    for (std::uint32_t i = 0; i < kWriters; ++i) {
+      metadata["writer"] = std::to_string(i);
+      const std::uint16_t points = writer.AddChannel(0, "points", "cdr", metadata);
+      for (std::uint32_t k = 0; k < 2; ++k) {
+        const Bytes message = MessageOf(1, Moving(static_cast<int>(k), &random));
+        writer.Write(points, k, i, i, std::as_bytes(std::span(message)));
+      }
+      if (i % 10 == 9) writer.EndChunk();
+    }
+  }
+  McapReader reader(file);
+  McapMessage message{};
+  std::uint32_t read = 0;
+  while (reader.Next(&message)) {
+    ++read;
+    EXPECT_EQ(message.data.size(), kHead_B + sizeof(float) * kValues);
+  }
+  EXPECT_TRUE(reader.faults().empty());
+  EXPECT_EQ(read, 2 * kWriters);
+  std::filesystem::remove(file);
+}
+
 TEST(PointCoding, EachChunkOfAFileCanBeReadAlone) {
   const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / ("points_" + std::to_string(getpid()));
   std::map<std::string, std::string> metadata;
