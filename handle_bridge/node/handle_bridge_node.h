@@ -83,7 +83,8 @@ class HandleBridgeNode {
   bus::Stamper stamper_;
   std::uint64_t next_index_ = 0;
   HandleState state_;
-  HandleState sent_;  ///< The newest published one.
+  HandleState sent_;             ///< The newest published one.
+  std::int64_t changed_ns_ = 0;  ///< When a pedal was down or anything changed last.
   Snapshot snapshot_;
   runtime::SeqLock<Snapshot> published_;
 };
