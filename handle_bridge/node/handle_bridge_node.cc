@@ -14,9 +14,9 @@ constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 /// tick.
 constexpr std::size_t kReadBytes = 512;
 
-/// While nothing changes and no pedal is down, HandleState is published this rarely: at first as often that a lost
-/// sample of the change does not matter, and rarely once that was long ago.
-constexpr std::int64_t kSilence_ns = 9'000'000, kSilenceAtRest_ns = 39'000'000, kRestsAfter_ns = 200'000'000;
+/// Longest time between two samples while nothing changes and no pedal is down: short for 0.2 s after a change, so that
+/// a lost sample is repeated, then long.
+constexpr std::int64_t kShortSilence_ns = 9'000'000, kLongSilence_ns = 39'000'000, kRestsAfter_ns = 200'000'000;
 /// Smaller changes of an angle, up to two thirds of a count of the converter, are mostly noise.
 constexpr float kSameAngle_rad = 0.005f;
 
@@ -86,10 +86,16 @@ void HandleBridgeNode::Step(const Tick& tick) {
 
 /// A pedal that is down is repeated each period: whether the current flows must not wait.
 void HandleBridgeNode::Publish(const Tick& tick) {
-  const bool quiet = state_.pedals == kPedalNone && state_.pedals == sent_.pedals &&
-                     std::equal(state_.handles.begin(), state_.handles.end(), sent_.handles.begin(), &LooksTheSame);
-  if (!quiet) changed_ns_ = tick.stamp_ns;
-  const std::int64_t silence_ns = tick.stamp_ns - changed_ns_ < kRestsAfter_ns ? kSilence_ns : kSilenceAtRest_ns;
+  const auto is_like = [this](const HandleState& other) {
+    return state_.pedals == kPedalNone && state_.pedals == other.pedals &&
+           std::equal(state_.handles.begin(), state_.handles.end(), other.handles.begin(), &LooksTheSame);
+  };
+  if (!is_like(rest_)) {
+    rest_ = state_;
+    changed_ns_ = tick.stamp_ns;
+  }
+  const bool quiet = is_like(sent_);
+  const std::int64_t silence_ns = tick.stamp_ns - changed_ns_ < kRestsAfter_ns ? kShortSilence_ns : kLongSilence_ns;
   if ((quiet && tick.stamp_ns - sent_.stamp.stamp_ns < silence_ns) || !output_->has_readers()) return;
   state_.stamp = stamper_.Next(tick.stamp_ns);
   output_->Write(state_);

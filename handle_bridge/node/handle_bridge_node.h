@@ -84,7 +84,8 @@ class HandleBridgeNode {
   std::uint64_t next_index_ = 0;
   HandleState state_;
   HandleState sent_;             ///< The newest published one.
-  std::int64_t changed_ns_ = 0;  ///< When a pedal was down or anything changed last.
+  HandleState rest_;             ///< As it was at the last change, however slow: since then it rests.
+  std::int64_t changed_ns_ = 0;  ///< When that was.
   Snapshot snapshot_;
   runtime::SeqLock<Snapshot> published_;
 };

@@ -79,8 +79,8 @@ void HapticsNode::ServoStep(const Tick& tick) noexcept {
   servo_.Step(tick);
   tick_.servo = servo_.record();
   const ServoFigures& figures = servo_.figures();
-  if (figures.models_used != models_used_) motion_to_force_.Add(figures.motion_to_force_ns);
-  models_used_ = figures.models_used;
+  if (figures.contacts_used != contacts_used_) motion_to_force_.Add(figures.motion_to_force_ns);
+  contacts_used_ = figures.contacts_used;
   figures_.Store(figures);
   if (!from_servo_.TryPush(tick_)) records_lost_.fetch_add(1, std::memory_order_relaxed);
 }

@@ -43,8 +43,8 @@ class HapticsNode {
   /// Servo thread, each millisecond. Does not wait, lock, allocate, log or throw.
   void ServoStep(const Tick& tick) noexcept;
 
-  /// Bus thread, each millisecond: newest contact model in, records of the servo out. In a replay or a test, call it
-  /// before and after ServoStep() on one thread.
+  /// Bus thread, each millisecond, at rest each four: newest contact model in, records of the servo out. In a replay or
+  /// a test, call it before and after ServoStep() on one thread.
   void BusStep();
 
   /// No tool has moved for a tenth of a second and none is near tissue: BusStep() is early enough each few
@@ -87,7 +87,7 @@ class HapticsNode {
   ContactModel arrived_;
   OperatorInput input_;
   TickRecord tick_;
-  std::uint64_t models_used_ = 0;
+  std::uint64_t contacts_used_ = 0;
   // Bus thread only.
   ContactModel received_;
   OperatorInput received_input_;

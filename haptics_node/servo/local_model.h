@@ -16,8 +16,8 @@ namespace fulcrum::haptics {
 
 /// Stiffness beyond which a rendered contact would be unstable in a light grip, as felt by the hand [N/m].
 inline constexpr double kMaxHandStiffness_N_m = 1200.0;
-/// A new model takes over during this time, shorter than a step of physics: a model that waits for the end of the last
-/// fade is late, and at equal lengths one late model would delay all later ones [ns].
+/// A new model takes over during this time, which is shorter than the period of physics: a model waits for the end of
+/// the last fade, so with equal lengths one late model would delay all later ones [ns].
 inline constexpr std::int64_t kCrossFade_ns = 8'000'000;
 
 /// Mapping from tip stiffness to hand stiffness: k_hand = scale |J^T n|^2 k_tip.

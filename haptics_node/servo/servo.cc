@@ -107,8 +107,11 @@ void Servo::TakePendingModel(std::int64_t now_ns) noexcept {
     channel.external_W = pending_.devices[i].p_ext_W;
   }
   model_time_ns_ = pending_.tool_stamp_ns;
-  figures_.motion_to_force_ns = now_ns - pending_.tool_stamp_ns;
-  ++figures_.models_used;
+  if (std::any_of(pending_.devices.begin(), pending_.devices.end(),
+                  [](const auto& device) { return device.count > 0; })) {
+    figures_.motion_to_force_ns = now_ns - pending_.tool_stamp_ns;
+    ++figures_.contacts_used;
+  }
   has_pending_ = false;
 }
 

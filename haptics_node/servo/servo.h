@@ -36,8 +36,8 @@ struct ServoFigures {
   double peak_force_N = 0;                  ///< Largest hand force since the start.
   std::array<double, kMaxTools> force_N{};  ///< Hand force of each tool (idl/README.md, Forces).
   std::uint64_t models_dropped = 0;
-  std::uint64_t models_used = 0;
-  std::int64_t motion_to_force_ns = 0;  ///< Age of the pose behind the newest model when its force was first rendered.
+  std::uint64_t contacts_used = 0;      ///< Models with a contact.
+  std::int64_t motion_to_force_ns = 0;  ///< Of the newest of these: age of its pose when its force was first rendered.
   std::uint64_t not_finite = 0;
 };
 

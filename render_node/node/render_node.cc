@@ -453,13 +453,16 @@ void RenderNode::Draw(double session_time_s, bool write_png) {
   scale_.store(quality_.scale(), std::memory_order_relaxed);
 }
 
-/// Of a live picture that shows a new shape of the tissue: the age of the step that made it, when the picture is drawn.
-/// A file is drawn when it is due, however long nothing has moved.
+/// Of a live picture that shows a new shape of the tissue: the age of the poses that made it, when the picture is
+/// drawn. A file is drawn when it is due, however long nothing has moved.
 void RenderNode::NoteLatency(double draw_ms) {
   const TissueFrameHeader& tissue = tissue_.header;
   const bool is_new = std::exchange(drawn_tissue_, tissue.stamp.sequence) != tissue.stamp.sequence;
   if (!is_new || !(window_ || streams_)) return;
-  const double age_s = session_time_s_ - tissue.session_time_s + 1e-3 * draw_ms;
+  // A step of physics stands for a whole multiple of its period, a little before the thread woke.
+  const auto period_s = static_cast<double>(scene_.physics.dt_s);
+  const double pose_s = period_s * std::floor(tissue.session_time_s / period_s + 1e-6);
+  const double age_s = session_time_s_ - pose_s + 1e-3 * draw_ms;
   motion_to_picture_.Add(std::llround(1e9 * age_s));
 }
 

@@ -47,7 +47,7 @@ void Copier::Copy(const recording::McapReader& reader, const recording::McapMess
   const std::uint64_t log_time_ns = message.log_time_ns + static_cast<std::uint64_t>(shift_ns);
   for (Part& part : parts_) {
     const std::size_t most =
-        &part == &parts_[1] ? recording::ChunkPacker::kCodedChunkBytes : recording::ChunkPacker::kChunkBytes;
+        &part == &parts_[1] ? recording::ChunkPacker::kLargeChunkBytes : recording::ChunkPacker::kChunkBytes;
     if (part.records.size() >= most ||
         (log_time_ns > part.first_ns && log_time_ns - part.first_ns >= kLongestChunk_ns)) {
       EndChunk(&part);

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 namespace {
 
 /// Larger recordings are not joined at the end of a session, which would take more than about ten seconds.
-constexpr std::uintmax_t kLongestJoin_B = 3'000'000'000;
+constexpr std::uintmax_t kLongestJoin_B = 200'000'000;
 
 std::string ValueOf(const recording::McapReader& reader, const char* record, const char* key) {
   const auto found = reader.metadata().find(record);

@@ -8,15 +8,15 @@ namespace {
 
 /// For readers other than this project's; the meaning of the fields is in recording/point_coding.h.
 constexpr const char* kRecordedTissueFrame = R"(
-// A TissueFrame in a recording. Values are the residuals of x y z of each vertex, in multiples of step_m.
+// A TissueFrame in a recording: its array as residuals of words.
 module fulcrum {
 module idl {
 
 struct RecordedTissueFrame {
   TissueFrameHeader header;
-  float step_m;                    // m; 0: words are the ordered bits of floats
+  float step_m;                    // m, a word counts these; 0: words are the ordered bits of floats
   unsigned long kind;              // 0 key, 1 difference from the frame before, 2 relative to the neighbour's, 3 as sent
-  unsigned long value_count;       // 3 * vertices; the rest of the frame's array is zero
+  unsigned long value_count;       // up to the last value that is not 0; the rest of 3 * vertex_count is 0
   sequence<octet> residuals;       // zigzag; low bytes of all values, then their second bytes, ...
 };
 

@@ -160,13 +160,13 @@ void Recorder::Exchange(std::int64_t now_ns, bool all, const std::string& end) {
     const std::lock_guard lock(mutex_);
     ended_ = ended_.empty() ? end : ended_;
     const bool due = filling_.small.used >= recording::ChunkPacker::kChunkBytes ||
-                     filling_.large.used >= recording::ChunkPacker::kCodedChunkBytes ||
+                     filling_.large.used >= recording::ChunkPacker::kLargeChunkBytes ||
                      now_ns - filling_.begin_ns >= kLongestChunk_ns;
     if (filling_.used() == 0 || !(due || all)) return;
     std::swap(filling_, writing_);
   }
   AddNewChannels();
-  Pack(&writing_.large, recording::ChunkPacker::kCodedChunkBytes);
+  Pack(&writing_.large, recording::ChunkPacker::kLargeChunkBytes);
   Pack(&writing_.small, recording::ChunkPacker::kChunkBytes);
 }
 

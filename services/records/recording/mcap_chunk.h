@@ -51,8 +51,9 @@ class ChunkPacker {
 
   /// Size at which a chunk is ended [B].
   static constexpr std::size_t kChunkBytes = std::size_t{1} << 20;
-  /// The same where messages are coded, before they are: the first of each chunk takes as much as ten others.
-  static constexpr std::size_t kCodedChunkBytes = std::size_t{32} << 20;
+  /// The same for large topics, before their messages are coded. So large that time ends a chunk: its first frame takes
+  /// as much as ten others.
+  static constexpr std::size_t kLargeChunkBytes = std::size_t{32} << 20;
 
  private:
   struct IndexEntry {

@@ -163,6 +163,7 @@ void McapReader::OpenChunk(const Record& record) {
   }
   left_ = chunk_;
   coders_.BeginChunk();
+  chunk_decoded_ = 0;
 }
 
 void McapReader::TakeChannel(std::uint16_t number, const McapChannel& channel) {
@@ -176,11 +177,12 @@ void McapReader::TakeChannel(std::uint16_t number, const McapChannel& channel) {
 
 bool McapReader::Decode(McapMessage* message) {
   if (!coders_.Has(message->channel)) return true;
-  PointCoder* const coder = coders_.Of(message->channel, kMostCoded);
-  if (coder == nullptr || !coder->Decode(message->data, &decoded_)) {
+  const bool has_room = chunk_decoded_ <= kMostChunkBytes;
+  if (!has_room || !coders_.Of(message->channel).Decode(message->data, &decoded_)) {
     Fault("a message of " + channels_.at(message->channel).topic.substr(0, 64) + " cannot be decoded");
     return false;
   }
+  chunk_decoded_ += decoded_.size();
   message->data = decoded_;
   return true;
 }

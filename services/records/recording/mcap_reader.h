@@ -77,10 +77,8 @@ class McapReader {
   /// Whether the file ends with a footer, so that its writer has closed it.
   [[nodiscard]] bool closed() const { return closed_; }
 
-  /// A chunk with a larger length counts as damaged.
+  /// A chunk with a larger length counts as damaged. No more is decoded from coded messages of a chunk.
   static constexpr std::uint64_t kMostChunkBytes = std::uint64_t{1} << 28;
-  /// Largest number of channels with coded messages in a chunk: each keeps its last one.
-  static constexpr std::size_t kMostCoded = 64;
   /// Largest number of faults that are kept.
   static constexpr std::size_t kMostFaults = 100;
 
@@ -116,6 +114,7 @@ class McapReader {
   std::map<std::uint16_t, McapChannel> channels_;
   PointCoders coders_;
   std::vector<std::uint8_t> decoded_;
+  std::uint64_t chunk_decoded_ = 0;  ///< Of the present chunk [B].
   std::map<std::string, std::map<std::string, std::string>> metadata_;
   std::vector<McapFault> faults_;
   bool closed_ = false, done_ = false, chunked_ = false;

@@ -170,17 +170,17 @@ bool PointCoder::Decode(std::span<const std::uint8_t> coded, std::vector<std::ui
   const auto kind = from.Number<std::uint32_t>();
   const std::size_t count = from.Number<std::uint32_t>();
   const std::span<const std::uint8_t> bytes = from.Take(from.Number<std::uint32_t>());
-  if (!from.good() || kind > kAsSent) return false;
-  if (kind == kAsSent) {
+  if (from.good() && kind == kAsSent) {
     message->assign(bytes.begin(), bytes.end());
     return true;
   }
   const std::size_t planes = count == 0 ? 0 : bytes.size() / count;
   const bool refers = kind != kKey;
-  const bool is_complete = count <= coding_.values && planes <= sizeof(std::uint32_t) && planes * count == bytes.size();
+  const bool is_complete = from.good() && kind < kAsSent && count <= coding_.values &&
+                           planes <= sizeof(std::uint32_t) && planes * count == bytes.size();
   const bool has_base = !refers || (!last_.empty() && last_.size() == count && last_step_ == step);
-  if (!is_complete || !has_base || !(std::isfinite(step) && step >= 0)) {
-    Restart();
+  if (!is_complete || !has_base || !(step == 0 || step == coding_.step)) {
+    Restart();  // So that nothing after it is decoded from the message before it.
     return false;
   }
   residuals_.assign(count, 0);
@@ -216,14 +216,10 @@ void PointCoders::BeginChunk() {
   }
 }
 
-PointCoder* PointCoders::Of(std::uint16_t channel, std::size_t most) {
-  auto found = coders_.find(channel);
-  if (found == coders_.end()) {
-    if (coders_.size() >= most) return nullptr;
-    found = coders_.emplace(channel, Entry{PointCoder(codings_.at(channel))}).first;
-  }
-  found->second.used = true;
-  return &found->second.coder;
+PointCoder& PointCoders::Of(std::uint16_t channel) {
+  Entry& entry = coders_.try_emplace(channel, Entry{PointCoder(codings_.at(channel))}).first->second;
+  entry.used = true;
+  return entry.coder;
 }
 
 }  // namespace fulcrum::recording

@@ -6,13 +6,16 @@
 //   head_B bytes   those of the message, unchanged
 //   float          step: a value is a multiple of it; 0: values are exact
 //   uint32         kind: 0 key, 1 difference, 2 difference relative to the neighbour, 3 as sent
-//   uint32         number of values; the others of the array are zero
+//   uint32         number of values: up to the last one that is not +0; those after it are 0
 //   uint32         length of what follows [B]
 //   bytes          residuals: the low byte of each, then the second byte of each, … as many as the largest needs
 //
-// A word is value / step, rounded, or for exact values the bits of the float in an order without a jump at zero. The
-// residual of word i, modulo 2^32 and as zigzag (0, -1, 1, -2, … become 0, 1, 2, 3, …), with p the words of the message
-// before and the value three places before i, the neighbour's same coordinate, counted as 0 for the first point:
+// A word is value / step, rounded; a reader gets the value as float(double(step) * int32(word)). With step 0 it is made
+// of the bits of the float: 0x7fffffff - (bits & 0x7fffffff) if it is negative, bits | 0x80000000 otherwise.
+//
+// A residual is a difference modulo 2^32, as zigzag: 0, -1, 1, -2, … become 0, 1, 2, 3, … w are the words of this
+// message, p those of the last message that was not kept as sent. i-3 is the same coordinate of the point before; for
+// the first point w[i-3] and p[i-3] are 0.
 //
 //   key            w[i] - w[i-3]
 //   difference     w[i] - p[i]
@@ -86,8 +89,8 @@ class PointCoders {
   [[nodiscard]] bool empty() const { return codings_.empty(); }
   [[nodiscard]] bool Has(std::uint16_t channel) const { return codings_.contains(channel); }
   void BeginChunk();
-  /// Of a channel that Has(). Null if the chunk needs more than `most`.
-  [[nodiscard]] PointCoder* Of(std::uint16_t channel, std::size_t most);
+  /// Of a channel that Has().
+  [[nodiscard]] PointCoder& Of(std::uint16_t channel);
 
  private:
   struct Entry {

@@ -79,19 +79,29 @@ class Recording final : public Target {
   }
   /// Coded messages: a key, a difference, one relative to the neighbour, one as sent.
   static Seed CodedSeed(const std::filesystem::path& file) {
+    constexpr std::size_t kHead_B = 92;  // Encapsulation and TissueFrameHeader.
     std::map<std::string, std::string> metadata{{"node", "physics_node"}};
-    recording::PutPointCoding({.head_B = 4, .values = 6, .step = 2e-6F}, &metadata);
+    recording::PutPointCoding({.head_B = kHead_B, .values = std::size_t{3} * kMaxTissueVertices, .step = 2e-6F},
+                              &metadata);
     {
       recording::McapWriter writer(file, "", "fuzz");
       const auto channel =
           writer.AddChannel(writer.AddSchema("TissueFrame", "omgidl", ""), "fulcrum/TissueFrame", "cdr", metadata);
-      const auto write = [&](std::uint32_t i, const std::array<float, 7>& words) {
-        writer.Write(channel, i, i, i, std::as_bytes(std::span(words)));
+      std::uint32_t sequence = 0;
+      const auto write = [&](std::span<const std::byte> bytes) {
+        ++sequence;
+        writer.Write(channel, sequence, sequence, sequence, bytes);
       };
-      write(1, {1, 0.1F, 0.2F, 0, 0.11F, 0.2F, 0.01F});
-      write(2, {2, 0.1F, 0.2F, 0, 0.11F, 0.2F, 0.01002F});
-      write(3, {3, 0.101F, 0.201F, 0, 0.111F, 0.201F, 0.01F});
-      writer.Write(channel, 4, 4, 4, std::as_bytes(std::span(metadata.at("node"))));
+      const std::array<float, 6> place{0.1F, 0.2F, 0, 0.11F, 0.2F, 0.01F};
+      for (const std::array<float, 6>& moved : std::array<std::array<float, 6>, 3>{
+               {{0, 0, 0, 0, 0, 0}, {0, 0, 0, 0, 0, 2e-5F}, {1e-3F, 1e-3F, 0, 1e-3F, 1e-3F, 0}}}) {
+        TissueFrame frame;
+        frame.header.vertex_count = 2;
+        for (std::size_t i = 0; i < place.size(); ++i) frame.xyz.push_back(place[i] + moved[i]);
+        Bytes cdr;
+        if (bus::EncodeCdr(frame, &cdr)) write(std::as_bytes(std::span(cdr)));
+      }
+      write(std::as_bytes(std::span(metadata.at("node"))));
     }
     return {"coded", ReadFile(file)};
   }

@@ -161,7 +161,7 @@ TEST_F(RenderNodeTest, TellsHowOldTheShapeInALivePictureIs) {
   EXPECT_EQ(told(), 0) << "nobody watches";
   const auto reader = bus_.pictures.MakeInput();
   moment = MakeSyntheticMoment(view_, 1.2);
-  moment.tissue.header.session_time_s = 1.15;
+  moment.tissue.header.session_time_s = 1.1512;
   Publish(moment);
   node->Step(At(1.2));
   EXPECT_EQ(told(), 3);

@@ -288,6 +288,14 @@ TEST_F(NodeTest, AStillHandleIsPublishedAHundredTimesASecondAndThenLessOften) {
   EXPECT_GE(state_.stamp.sequence - begin, 39u) << "a pedal that is down is repeated each period";
 }
 
+TEST_F(NodeTest, AJawThatMovesSlowlyIsNotAtRest) {
+  double jaw_deg = 10;
+  for (int i = 0; i < 100; ++i) Tick(jaw_deg);
+  const std::uint64_t begin = state_.stamp.sequence;
+  for (int i = 0; i < 800; ++i) Tick(jaw_deg += 0.015);  // 6 degrees a second
+  EXPECT_GE(state_.stamp.sequence - begin, 180u) << "a hundred times a second";
+}
+
 TEST_F(NodeTest, AbsentHandleIsNeitherPublishedNorMissed) {
   HandleBridgeNode::Links links;
   links.handles[0] = MakeLink(&handle_[0]);

@@ -88,7 +88,9 @@ function frameOf({ header, step_m: step, kind, value_count: count, residuals }, 
   if (kind > 2 || step === 0) {
     throw new Error(`a frame of kind ${kind} and step ${step}`);
   }
-  return { header, xyz: Float32Array.from(words, (word) => word * step) };
+  const xyz = new Float32Array(3 * header.vertex_count);
+  words.forEach((word, i) => (xyz[i] = word * step));
+  return { header, xyz };
 }
 
 const ours = await ourMessages();
