@@ -281,7 +281,9 @@ TEST_F(LogTools, RecordedPositionsAreRoundedToTheStepOrExact) {
         std::vector<std::uint8_t> bytes;
         ASSERT_TRUE(bus::EncodeCdr(frame, &bytes));
         bus::RawSample sample{TopicId::kTissueFrame, {1}, i, 1000, static_cast<std::int64_t>(i) * 1000, {}, {}};
-        sample.body = std::as_bytes(std::span(bytes));
+        constexpr std::size_t kEncapsulation_B = 4;
+        sample.head = std::as_bytes(std::span(bytes)).first(kEncapsulation_B);
+        sample.body = std::as_bytes(std::span(bytes)).subspan(kEncapsulation_B);
         recorder.Receive(sample, [] { return true; });
         sent.push_back(std::move(frame));
       }

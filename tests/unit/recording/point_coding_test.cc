@@ -27,7 +27,7 @@ constexpr std::size_t kFields_B = 16;  ///< Step, kind, count, length.
 Bytes MessageOf(std::uint8_t head, const std::vector<float>& values) {
   Bytes message(kHead_B + sizeof(float) * kValues);
   std::fill_n(message.begin(), kHead_B, head);
-  std::memcpy(message.data() + kHead_B, values.data(), sizeof(float) * values.size());
+  if (!values.empty()) std::memcpy(message.data() + kHead_B, values.data(), sizeof(float) * values.size());
   return message;
 }
 std::vector<float> ValuesOf(const Bytes& message) {
