@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "services/base/core/byte_stream.h"
+#include "services/base/core/zigzag.h"
 
 namespace fulcrum::recording {
 namespace {
@@ -23,8 +24,8 @@ constexpr std::uint32_t kSign = 0x80000000u;
 /// Largest number of steps: differences of differences stay within 32 bits.
 constexpr float kMostSteps = 1 << 28;
 
-std::uint32_t Zigzag(std::uint32_t value) { return (value << 1) ^ (0u - (value >> 31)); }
-std::uint32_t Unzigzag(std::uint32_t value) { return (value >> 1) ^ (0u - (value & 1u)); }
+/// Of a difference modulo 2^32.
+std::uint32_t ZigzagOf(std::uint32_t difference) { return Zigzag(static_cast<std::int32_t>(difference)); }
 
 /// Bits of a float such that neighbouring values have neighbouring numbers, and back.
 std::uint32_t Ordered(std::uint32_t bits) { return (bits & kSign) != 0 ? kSign - (bits & ~kSign) - 1 : bits | kSign; }
@@ -107,8 +108,8 @@ std::uint32_t PointCoder::Choose() const {
   for (std::size_t i = kPoint; i + kPoint <= count; i += 8 * kPoint) {
     for (std::size_t k = i; k < i + kPoint; ++k) {
       const std::uint32_t moved = words_[k] - last_[k];
-      sum += Zigzag(moved);
-      neighbour_sum += Zigzag(moved - (words_[k - kPoint] - last_[k - kPoint]));
+      sum += ZigzagOf(moved);
+      neighbour_sum += ZigzagOf(moved - (words_[k - kPoint] - last_[k - kPoint]));
     }
   }
   return sum <= neighbour_sum ? kDifference : kNeighbour;
@@ -121,11 +122,11 @@ std::uint32_t PointCoder::Predict(std::uint32_t kind) {
   std::uint32_t all = 0;
   const std::size_t first = kind == kDifference ? count : std::min(kPoint, count);
   for (std::size_t i = 0; i < first; ++i) {
-    residuals_[i] = Zigzag(words_[i] - last_[i]);
+    residuals_[i] = ZigzagOf(words_[i] - last_[i]);
     all |= residuals_[i];
   }
   for (std::size_t i = first; i < count; ++i) {
-    residuals_[i] = Zigzag(words_[i] - last_[i] - (words_[i - kPoint] - last_[i - kPoint]));
+    residuals_[i] = ZigzagOf(words_[i] - last_[i] - (words_[i - kPoint] - last_[i - kPoint]));
     all |= residuals_[i];
   }
   return all;
@@ -194,7 +195,7 @@ bool PointCoder::Decode(std::span<const std::uint8_t> coded, std::vector<std::ui
   words_.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
     const std::uint32_t moved = kind == kDifference || i < kPoint ? 0 : words_[i - kPoint] - last_[i - kPoint];
-    words_[i] = last_[i] + moved + Unzigzag(residuals_[i]);
+    words_[i] = last_[i] + moved + static_cast<std::uint32_t>(Unzigzag(residuals_[i]));
   }
   message->assign(coding_.message_B(), 0);
   std::copy(head.begin(), head.end(), message->begin());

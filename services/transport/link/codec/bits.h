@@ -1,4 +1,4 @@
-// Small whole numbers in few bits: zigzag, variable length, and values of one width packed tightly.
+// Small whole numbers in few bits: variable length, and values of one width packed tightly.
 #pragma once
 
 #include <bit>
@@ -8,16 +8,9 @@
 #include <vector>
 
 #include "services/base/core/byte_stream.h"
+#include "services/base/core/zigzag.h"
 
 namespace fulcrum::link {
-
-/// Maps 0, -1, 1, -2, … to 0, 1, 2, 3, …, so that values of small magnitude become small unsigned numbers.
-[[nodiscard]] constexpr std::uint32_t Zigzag(std::int32_t value) {
-  return (static_cast<std::uint32_t>(value) << 1) ^ static_cast<std::uint32_t>(value >> 31);
-}
-[[nodiscard]] constexpr std::int32_t Unzigzag(std::uint32_t value) {
-  return static_cast<std::int32_t>(value >> 1) ^ -static_cast<std::int32_t>(value & 1u);
-}
 
 /// Appends seven bits per byte, the low ones first; the high bit of a byte means that more bytes follow.
 inline void PutVarint(std::uint32_t value, std::vector<std::uint8_t>* out) {
