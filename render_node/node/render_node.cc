@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <map>
+#include <optional>
 #include <osgGA/GUIEventAdapter>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "render_node/geometry/laparoscope.h"
+#include "render_node/node/camera_keys.h"
 #include "services/base/core/contact_force.h"
 #include "services/base/core/generator_inputs.h"
 #include "services/base/runtime/cyclic_thread.h"
@@ -105,6 +106,13 @@ void RenderNode::FollowEffects() {
   if (!ready() || !view_.UpdateEffects(session_time_s_)) return;
   changed_on_screen_ = true;
   view_.Update();  // Blood runs down the present shape, and steam rises from it.
+}
+
+bool RenderNode::DrawInto(Bitmap* picture) {
+  if (!ready() || !changed_on_screen_) return false;
+  Draw(session_time_s_, false, ReadBack::kAlways);
+  *picture = picture_;
+  return true;
 }
 
 void RenderNode::Finish() {
@@ -334,17 +342,8 @@ void RenderNode::UpdateHands() {
 }
 
 void RenderNode::Press(int key) {
-  static const std::map<int, CameraKey> kCameraKeys{{osgGA::GUIEventAdapter::KEY_Left, CameraKey::kLeft},
-                                                    {osgGA::GUIEventAdapter::KEY_Right, CameraKey::kRight},
-                                                    {osgGA::GUIEventAdapter::KEY_Up, CameraKey::kUp},
-                                                    {osgGA::GUIEventAdapter::KEY_Down, CameraKey::kDown},
-                                                    {'+', CameraKey::kNearer},
-                                                    {'-', CameraKey::kFarther},
-                                                    {'r', CameraKey::kRollLeft},
-                                                    {'t', CameraKey::kRollRight},
-                                                    {'0', CameraKey::kReset}};
-  if (const auto camera_key = kCameraKeys.find(key); camera_key != kCameraKeys.end()) {
-    camera_.Press(camera_key->second);
+  if (const std::optional<CameraKey> camera_key = CameraKeyOf(key)) {
+    camera_.Press(*camera_key);
     view_.SetCamera(camera_.params());
     return;
   }
@@ -424,13 +423,13 @@ void RenderNode::FollowScope() {
   }
 }
 
-void RenderNode::Draw(double session_time_s, bool write_png) {
+void RenderNode::Draw(double session_time_s, bool write_png, ReadBack read) {
   const auto start = std::chrono::steady_clock::now();
   const bool moving = view_.UpdateEffects(session_time_s);
   view_.SetScale(quality_.scale());
   view_.Update();
   UpdateTexts();
-  if (write_png || streams_) {
+  if (write_png || streams_ || read == ReadBack::kAlways) {
     display_.DrawAndRead(&picture_);
   } else {
     display_.Draw();

@@ -62,6 +62,10 @@ class RenderNode {
   /// a second when the next picture is drawn. Call from the thread of Step.
   void FollowEffects();
 
+  /// Draws into `picture`, for a program that shows a recording. False, and nothing is drawn, when nothing has changed
+  /// since the last picture or no tissue has come yet. Call from the thread of Step, after it.
+  [[nodiscard]] bool DrawInto(Bitmap* picture);
+
   /// Time between two steps. In a window the scene sets the wanted rate of pictures, the cart (`cart_ns`) the rate that
   /// the machine can reach, and the lower one is used. An operator's hand and readers of live pictures wait for theirs:
   /// then, and off screen, the cart's is used [ns].
@@ -110,7 +114,8 @@ class RenderNode {
   void FindLate();
   [[nodiscard]] bool Recent(double time_s) const;
   void UpdateTexts();
-  void Draw(double session_time_s, bool write_png);
+  enum class ReadBack { kIfStreamed, kAlways };
+  void Draw(double session_time_s, bool write_png, ReadBack read = ReadBack::kIfStreamed);
   void NoteLatency(double draw_ms);
   void Report(const std::string& error);
 

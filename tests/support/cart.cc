@@ -56,7 +56,7 @@ Cart::Cart(const std::string& scene, int domain, const std::vector<std::string>&
               ("fulcrum-cart-" + std::to_string(::getpid()) + "-" + std::to_string(domain))) {
   fs::remove_all(folder_);
   fs::create_directories(folder_);
-  std::vector<std::string> arguments{"up", scene, "--domain", std::to_string(domain), "--out", folder_};
+  std::vector<std::string> arguments{"up", scene, "--domain", std::to_string(domain), "--out", folder_, "--no-video"};
   arguments.insert(arguments.end(), more_arguments.begin(), more_arguments.end());
   up_ = Program("fulcrum", arguments);
 }

@@ -28,7 +28,7 @@ bool WaitFor(double limit_s, const std::function<bool()>& done);
 /// Processor time that a process has used [s]; none when it has ended.
 [[nodiscard]] std::optional<double> CpuSeconds(pid_t pid);
 
-/// One run of `fulcrum up SCENE`; the destructor ends all its processes.
+/// One run of `fulcrum up SCENE` without the video at its end; the destructor ends all its processes.
 class Cart {
  public:
   Cart(const std::string& scene, int domain, const std::vector<std::string>& more_arguments = {});

@@ -84,7 +84,9 @@ class FakeCart {
     const fs::path scene = folder_.path() / "tiny.fulcrum";
     scene::WriteSceneFile(data_, "name: tiny\n", scene);
     // No identity of a keyed bus has the rights for the ports of the fake node; the scenarios swap it by its path.
-    Words words{"up", scene, "--domain", std::to_string(domain_), "--out", out(), "--open-bus", "--allow-swap-command"};
+    Words words{"up",        scene, "--domain",   std::to_string(domain_),
+                "--out",     out(), "--open-bus", "--allow-swap-command",
+                "--no-video"};
     words.insert(words.end(), more.begin(), more.end());
     up_ = Program(fulcrum(), words);
   }

@@ -194,6 +194,30 @@ ExitCode Map(const po::variables_map& values, const Files& files) {
   return ExitCode::kDone;
 }
 
+void AddVideoOptions(po::options_description* options) {
+  options->add_options()  //
+      ("out", po::value<std::string>()->value_name("FILE"),
+       "MP4 file to write (default: video.mp4 beside the recording)")  //
+      ("until", po::value<std::string>()->value_name("SECONDS"),
+       "end at this session time [s] (default: the end of the recording)")  //
+      ("scene", po::value<std::string>()->value_name("FILE"),
+       "compiled scene (default: scene.fulcrum beside the recording)");
+}
+
+/// The program `replayer` contains the renderer.
+ExitCode Video(const po::variables_map& values, const Files& files) {
+  if (files.size() != 1) {
+    throw InputError("video needs one file, got " + std::to_string(files.size()) + "; see fulcrum log video --help");
+  }
+  const std::string video = values.count("out") != 0 ? values["out"].as<std::string>()
+                                                     : fs::path(files[0]).replace_filename("video.mp4").string();
+  Words command{"replayer", files[0].string(), "--video=" + video};
+  for (const char* name : {"until", "scene"}) {
+    if (values.count(name) != 0) command.push_back(std::string("--") + name + '=' + values[name].as<std::string>());
+  }
+  Become(command);
+}
+
 constexpr std::array kTools{
     Tool{"info", "info FILE...", "Print the content of a recording: session, topics, rates, losses.", NoOptions, Info},
     Tool{"list", "list [FOLDER...]", "List the recordings in a folder (default: out), oldest first.", NoOptions, List},
@@ -208,6 +232,8 @@ constexpr std::array kTools{
     Tool{"merge", "merge OUT FILE...",
          "Join the recordings of one session, after its recorder was restarted, into the file OUT.", NoOptions, Merge},
     Tool{"map", "map FILE [options]", "Draw a map of the cut and print its figures.", AddMapOptions, Map},
+    Tool{"video", "video FILE [options]",
+         "Draw the session as a video (H.264, 30 pictures a second, chapters). Needs ffmpeg.", AddVideoOptions, Video},
 };
 
 void PrintTools() {

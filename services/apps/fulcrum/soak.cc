@@ -47,7 +47,7 @@ ExitCode Soak(const Words& words) {
   settings.domain = DomainOf(arguments, config::DefaultDomain());
   settings.out = values["out"].as<std::string>();
   settings.program = runtime::ProgramFolder() / "fulcrum";
-  if (values.count("record") != 0) settings.up.emplace_back("--record");
+  if (values.count("record") != 0) settings.up.insert(settings.up.end(), {"--record", "--no-video"});
   if (const fs::path cart = CartOf(arguments); !cart.empty()) {
     settings.cart = config::LoadCart(cart);
   }

@@ -15,6 +15,7 @@ constexpr const char* kUsage =
     R"(usage: replayer RECORDING --into NODE... [options]
        replayer RECORDING --live [--only NODE... | --except NODE...] [options]
        replayer RECORDING --film
+       replayer RECORDING --video FILE [options]
        replayer RECORDING --test NODE [--expect HASH] [--assert EXPR...] [options]
 
 Replays a recorded session: nodes compute its ticks again from exactly the recorded inputs, and after each tick their
@@ -39,6 +40,11 @@ With --film the pictures are drawn for a program: it writes session times to the
 from the standard output "TIME BYTES" and a JPEG file of BYTES bytes for each (0: the picture has not changed). The first
 line is "end TIME". Any order of times is possible; a step back takes longer.
 
+With --video the session becomes a video: H.264 in an MP4 file, 30 pictures a second in the scene's size, with a chapter
+for each use of the generator and each warning. Needs the program ffmpeg. fulcrum log video does the same.
+
+  replayer out/latest/recording.mcap --video video.mp4
+
 With --test one node computes all ticks of the session, also after states that differ, and its figures are checked
 against --expect and --assert; --junit writes the result for a CI system. Without --expect and --assert each state must
 equal the recorded one. fulcrum test-node does the same.
@@ -54,8 +60,12 @@ constexpr const char* kExitCodes =
 void AddOptions(po::options_description* options) {
   options->add_options()  //
       ("into", po::value<std::vector<std::string>>()->multitoken()->value_name("NODE"),
-       "nodes to replay, one or more of physics, thermal, haptics, render")       //
-      ("film", "draw the pictures of the times that come on the standard input")  //
+       "nodes to replay, one or more of physics, thermal, haptics, render")                    //
+      ("film", "draw the pictures of the times that come on the standard input")               //
+      ("video", po::value<std::string>()->value_name("FILE"), "write the session as a video")  //
+      ("within", po::value<double>()->value_name("S")->default_value(0),
+       "video: be ready after this time [s], with fewer different pictures a second if need be, at least one; 0: as "
+       "long as it takes")  //
       ("test", po::value<std::vector<std::string>>()->value_name("NODE"),
        "node to test: physics, thermal, haptics or render")  //
       ("expect", po::value<std::string>()->value_name("HASH"),

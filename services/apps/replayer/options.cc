@@ -51,8 +51,9 @@ std::filesystem::path RecordingOf(const CommandLine& line) {
 
 void CheckKind(const CommandLine& line) {
   int kinds = 0;
-  for (const char* kind : {"into", "live", "film", "test"}) kinds += line.Has(kind) ? 1 : 0;
-  if (kinds != 1) throw InputError("give one of --into NODE..., --live, --film and --test NODE; see --help");
+  for (const char* kind : {"into", "live", "film", "video", "test"}) kinds += line.Has(kind) ? 1 : 0;
+  if (kinds != 1)
+    throw InputError("give one of --into NODE..., --live, --film, --video FILE and --test NODE; see --help");
 }
 
 LiveSettings LiveSettingsFrom(const CommandLine& line) {
@@ -113,6 +114,13 @@ void ReadVariant(const CommandLine& line, Options* options) {
   }
 }
 
+void ReadVideo(const CommandLine& line, Options* options) {
+  options->video = line.TextOf("video");
+  if (options->video.empty()) throw InputError("--video: needs the name of a file, for example video.mp4");
+  options->video_within_s = line.ValueOf<double>("within");
+  if (!(options->video_within_s >= 0)) throw InputError("--within: must be 0 (as long as it takes) or more seconds");
+}
+
 void ReadFiles(const CommandLine& line, Options* options) {
   const std::filesystem::path& recording = options->lock_step.recording;
   options->scene = recording::BesideRecording(line.TextOf("scene"), recording, "scene.fulcrum");
@@ -150,13 +158,19 @@ Options ParseOptions(int argc, char** argv) {
     ReadFiles(line, &options);
     return options;
   }
+  options.quiet = line.Has("quiet") || ::isatty(STDERR_FILENO) == 0;
+  if (line.Has("video")) {
+    ReadVideo(line, &options);
+    ReadPace(line, &options.lock_step);
+    ReadFiles(line, &options);
+    return options;
+  }
   options.lock_step.nodes = NodesNamed(line, options.test ? "test" : "into", kReplayable);
   ReadDemands(line, &options);
   ReadPictures(line, &options);
   ReadPace(line, &options.lock_step);
   ReadVariant(line, &options);
   ReadFiles(line, &options);
-  options.quiet = line.Has("quiet") || ::isatty(STDERR_FILENO) == 0;
   return options;
 }
 

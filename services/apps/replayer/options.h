@@ -13,11 +13,13 @@
 namespace fulcrum::replay {
 
 struct Options {
-  std::string answer;    ///< Text of help or version. Not empty: it is to be printed, and nothing else is set.
-  bool live = false;     ///< --live was given: only `live_settings` is used.
-  bool test = false;     ///< --test was given: one node is checked against `demands`. None of these: --into.
-  bool film = false;     ///< --film was given: only `recording` of `lock_step` and `scene` are used.
-  bool console = false;  ///< --console.
+  std::string answer;           ///< Text of help or version. Not empty: it is to be printed, and nothing else is set.
+  bool live = false;            ///< --live was given: only `live_settings` is used.
+  bool test = false;            ///< --test was given: one node is checked against `demands`. None of these: --into.
+  bool film = false;            ///< --film was given: only `recording` of `lock_step` and `scene` are used.
+  std::filesystem::path video;  ///< File of --video; empty: it was not given. With `lock_step.until_s`.
+  double video_within_s = 0;    ///< --within [s]; 0: without limit.
+  bool console = false;         ///< --console.
   LiveSettings live_settings;
   LockStepSettings lock_step;        ///< Without `folder`, which a run makes.
   bool pictures = false;             ///< Render was named; it is not in `lock_step.nodes`.

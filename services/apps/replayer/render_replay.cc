@@ -19,6 +19,7 @@ template <class T>
 class Feed {
  public:
   [[nodiscard]] bus::Input<T>& input() { return *in_; }
+  [[nodiscard]] const T& newest() const { return message_; }
   /// True when the message is of this topic; its stamp goes to `stamp_ns`.
   bool Take(const std::string& topic, std::span<const std::uint8_t> bytes, std::int64_t* stamp_ns) {
     if (topic != bus::RoleOf<T>().name) return false;
@@ -45,26 +46,19 @@ bus::Input<T>& InputIn(Feeds& feeds) {
   return std::get<Feed<T>>(feeds).input();
 }
 
-render::RenderPorts PortsOf(Feeds& feeds, bus::LoanOutput<Picture>* pictures) {
-  return {InputIn<TissueFrame>(feeds),
-          InputIn<TopologyState>(feeds),
-          InputIn<TemperaturePatch>(feeds),
-          InputIn<ToolState>(feeds),
-          InputIn<HandleState>(feeds),
-          InputIn<ThermalEvent>(feeds),
-          InputIn<CauteryContact>(feeds),
-          InputIn<GeneratorSetting>(feeds),
-          InputIn<ContactModel>(feeds),
-          nullptr,
-          pictures};
+render::RenderPorts PortsOf(Feeds& feeds) {
+  return {InputIn<TissueFrame>(feeds),      InputIn<TopologyState>(feeds),
+          InputIn<TemperaturePatch>(feeds), InputIn<ToolState>(feeds),
+          InputIn<HandleState>(feeds),      InputIn<ThermalEvent>(feeds),
+          InputIn<CauteryContact>(feeds),   InputIn<GeneratorSetting>(feeds),
+          InputIn<ContactModel>(feeds),     nullptr};
 }
 
 }  // namespace
 
 struct RenderReplay::Impl {
-  Impl(const std::filesystem::path& file, const SceneView& given, const render::RenderSettings& settings,
-       bus::LoanOutput<Picture>* pictures)
-      : recording(file), scene(given), messages(file), node(given, settings, PortsOf(feeds, pictures)) {}
+  Impl(const std::filesystem::path& file, const SceneView& given, const render::RenderSettings& settings)
+      : recording(file), scene(given), messages(file), node(given, settings, PortsOf(feeds)) {}
 
   [[nodiscard]] double TimeOf(std::int64_t stamp_ns) const {
     return 1e-9 * static_cast<double>(stamp_ns - session->session_start_ns);
@@ -81,14 +75,20 @@ struct RenderReplay::Impl {
 };
 
 RenderReplay::RenderReplay(const std::filesystem::path& recording, const SceneView& scene,
-                           const render::RenderSettings& settings, bus::LoanOutput<Picture>* pictures)
-    : impl_(std::make_unique<Impl>(recording, scene, settings, pictures)) {}
+                           const render::RenderSettings& settings)
+    : impl_(std::make_unique<Impl>(recording, scene, settings)) {}
 
 RenderReplay::~RenderReplay() = default;
 
 render::RenderNode& RenderReplay::node() { return impl_->node; }
 
 std::int64_t RenderReplay::session_start_ns() const { return impl_->session->session_start_ns; }
+
+const HandleState& RenderReplay::handles() const { return std::get<Feed<HandleState>>(impl_->feeds).newest(); }
+const GeneratorSetting& RenderReplay::generator() const {
+  return std::get<Feed<GeneratorSetting>>(impl_->feeds).newest();
+}
+const ThermalEvent& RenderReplay::event() const { return std::get<Feed<ThermalEvent>>(impl_->feeds).newest(); }
 
 std::optional<double> RenderReplay::Next() {
   recording::McapMessage message{};

@@ -13,10 +13,8 @@ namespace fulcrum::replay {
 
 class RenderReplay {
  public:
-  /// @param pictures topic of the drawn pictures; null: none. `scene` and `pictures` must outlive it. Throws
-  /// InputError, and std::runtime_error when OpenGL is missing.
-  RenderReplay(const std::filesystem::path& recording, const SceneView& scene, const render::RenderSettings& settings,
-               bus::LoanOutput<Picture>* pictures = nullptr);
+  /// `scene` must outlive it. Throws InputError, and std::runtime_error when OpenGL is missing.
+  RenderReplay(const std::filesystem::path& recording, const SceneView& scene, const render::RenderSettings& settings);
   ~RenderReplay();
   RenderReplay(const RenderReplay&) = delete;
   RenderReplay& operator=(const RenderReplay&) = delete;
@@ -27,6 +25,11 @@ class RenderReplay {
 
   /// CLOCK_MONOTONIC at session time 0 [ns]; valid after Next() has returned a time.
   [[nodiscard]] std::int64_t session_start_ns() const;
+
+  /// The newest messages handed over so far. Next() hands over one, so that none is missed between two calls.
+  [[nodiscard]] const HandleState& handles() const;
+  [[nodiscard]] const GeneratorSetting& generator() const;
+  [[nodiscard]] const ThermalEvent& event() const;
 
   /// One step of the node with the messages handed over so far.
   void Step(double time_s);

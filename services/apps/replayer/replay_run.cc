@@ -9,6 +9,7 @@
 #include "services/apps/replayer/pictures.h"
 #include "services/apps/replayer/progress_line.h"
 #include "services/apps/replayer/scratch_folder.h"
+#include "services/apps/replayer/video.h"
 #include "services/apps/replayer/what_if.h"
 #include "services/apps/replayer/what_if_report.h"
 #include "services/base/core/error.h"
@@ -66,6 +67,18 @@ ExitCode CompareWithRecording(const Options& options, const LockStepSettings& se
 int RunFilm(const Options& options) {
   const scene::SceneFile scene(options.scene);
   ShowFilm(options.lock_step.recording, scene.view(), std::cin, std::cout);
+  return static_cast<int>(ExitCode::kDone);
+}
+
+int RunVideo(const Options& options) {
+  const scene::SceneFile scene(options.scene);
+  const ProgressLine progress(options.quiet);
+  const VideoSettings settings{options.lock_step.recording, options.video, options.lock_step.until_s,
+                               options.video_within_s};
+  const VideoResult result = MakeVideo(settings, scene.view(), progress.callback());
+  progress.Clear();
+  std::cout << options.video.string() << ": " << result.pictures << " pictures, " << result.duration_s << " s\n";
+  if (!options.json.empty()) WriteVideoJson(result, options.json);
   return static_cast<int>(ExitCode::kDone);
 }
 

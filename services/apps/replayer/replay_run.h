@@ -12,4 +12,8 @@ int RunReplay(const Options& options);
 /// replayer --film, on standard input and output; see ShowFilm(). Returns the exit code; throws the same.
 int RunFilm(const Options& options);
 
+/// replayer --video; see MakeVideo(). Prints the result and writes it to `options.json`. Returns the exit code; throws
+/// the same.
+int RunVideo(const Options& options);
+
 }  // namespace fulcrum::replay

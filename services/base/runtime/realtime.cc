@@ -24,12 +24,16 @@ namespace fulcrum::runtime {
 namespace {
 
 std::atomic<bool> stop_requested{false};
+std::atomic<int> stop_signals{0};
 static_assert(std::atomic<bool>::is_always_lock_free, "the signal handler may only touch a lock-free flag");
 
 // Fixed storage, since a log line may come from any thread while main sets the name.
 std::array<char, 32> log_name{"fulcrum"};
 
-void OnStopSignal(int) { stop_requested.store(true, std::memory_order_relaxed); }
+void OnStopSignal(int) {
+  stop_requested.store(true, std::memory_order_relaxed);
+  stop_signals.fetch_add(1, std::memory_order_relaxed);
+}
 
 bool HasCapability(int capability) {
   __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
@@ -134,6 +138,8 @@ void InstallStopSignals() {
 }
 
 bool ShouldStop() noexcept { return stop_requested.load(std::memory_order_relaxed); }
+
+int StopSignals() noexcept { return stop_signals.load(std::memory_order_relaxed); }
 
 void RequestStop() noexcept { stop_requested.store(true, std::memory_order_relaxed); }
 

@@ -28,6 +28,8 @@ void FlushDenormals();
 void InstallStopSignals();
 [[nodiscard]] bool ShouldStop() noexcept;
 void RequestStop() noexcept;
+/// How many of these signals have come, for work after the stop that a further one cancels.
+[[nodiscard]] int StopSignals() noexcept;
 
 /// Level of a log line. A line is "12:34:56.789 physics_node info: text" on stderr. Not for the servo thread.
 enum class LogLevel { kInfo, kWarning, kError };

@@ -15,10 +15,10 @@
 #include <vector>
 
 #include "services/base/core/error.h"
+#include "services/base/runtime/child_process.h"
 #include "services/base/runtime/file_descriptor.h"
 #include "services/session/console/json.h"
 #include "services/session/console/screen_text.h"
-#include "services/session/supervisor/child_process.h"
 
 namespace fulcrum::console {
 namespace {
@@ -109,8 +109,8 @@ class AttemptFilms::Projector {
     const runtime::FileDescriptor theirs(pair[1]);
     log_ = runtime::FileDescriptor(::memfd_create("film", MFD_CLOEXEC));
     if (log_.get() < 0) throw InputError(std::string("no memory for the film's messages: ") + ::strerror(errno));
-    process_ = supervisor::ChildProcess::StartOn(replayer, {recording.string(), "--film"},
-                                                 {.input = theirs.get(), .output = theirs.get(), .error = log_.get()});
+    process_ = runtime::ChildProcess::StartOn(replayer, {recording.string(), "--film"},
+                                              {.input = theirs.get(), .output = theirs.get(), .error = log_.get()});
     thread_ = std::jthread([from = ours_.get(), take = std::move(take)] { Forward(from, take); });
   }
   ~Projector() {
@@ -141,7 +141,7 @@ class AttemptFilms::Projector {
 
   const std::uint64_t number_;
   runtime::FileDescriptor ours_, log_;
-  supervisor::ChildProcess process_;
+  runtime::ChildProcess process_;
   std::jthread thread_;
 };
 

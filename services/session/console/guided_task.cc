@@ -60,7 +60,7 @@ GuidedTask::GuidedTask(std::string title, const std::filesystem::path& program,
                        const std::vector<std::string>& arguments)
     : title_(std::move(title)) {
   Terminal terminal;
-  process_ = supervisor::ChildProcess::StartOn(program, arguments, {terminal.theirs(), terminal.theirs()});
+  process_ = runtime::ChildProcess::StartOn(program, arguments, {terminal.theirs(), terminal.theirs()});
   terminal_ = terminal.TakeOurs();
 }
 

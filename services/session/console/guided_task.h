@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "services/base/runtime/child_process.h"
 #include "services/session/console/screen_text.h"
-#include "services/session/supervisor/child_process.h"
 
 namespace fulcrum::console {
 
@@ -34,16 +34,16 @@ class GuidedTask {
   [[nodiscard]] bool wants_enter() const;
   [[nodiscard]] bool cancelled() const { return kill_ns_ != 0; }
   /// How the program ended; nullopt while it runs.
-  [[nodiscard]] const std::optional<supervisor::ProcessEnd>& end() const { return end_; }
+  [[nodiscard]] const std::optional<runtime::ProcessEnd>& end() const { return end_; }
 
  private:
   bool Read();
 
   std::string title_;
   int terminal_ = -1;  ///< The console's side of the pseudo-terminal.
-  supervisor::ChildProcess process_;
+  runtime::ChildProcess process_;
   ScreenText screen_;
-  std::optional<supervisor::ProcessEnd> end_;
+  std::optional<runtime::ProcessEnd> end_;
   std::int64_t kill_ns_ = 0;  ///< Time of SIGKILL after Cancel; 0: not cancelled.
 };
 

@@ -48,7 +48,8 @@ std::vector<std::string> UpWords(const SessionRunSettings& settings, const Sessi
   if (order.seconds) add("--seconds", supervisor::Fixed(*order.seconds, 1));
   if (order.power_W) add("--set", "script.power_W=" + supervisor::Fixed(*order.power_W, 1));
   if (order.picture_rate_Hz) add("--set", "render.png_rate_Hz=" + supervisor::Fixed(*order.picture_rate_Hz, 1));
-  if (order.record) words.emplace_back("--record");
+  // The page shows the recording itself, and a trainee waits for the score.
+  if (order.record) words.insert(words.end(), {"--record", "--no-video"});
   if (order.hands) add("--hands", "browser");
   if (!order.trainee.empty()) {
     add("--trainee", order.trainee);
@@ -66,8 +67,7 @@ SessionRun::SessionRun(SessionRunSettings settings)
 
 void SessionRun::Start(const SessionOrder& order) {
   runtime::WritePrivateFile(log_, "", "log");
-  up_ = supervisor::ChildProcess::Start(settings_.program, UpWords(settings_, order), log_,
-                                        supervisor::WithParent::kStays);
+  up_ = runtime::ChildProcess::Start(settings_.program, UpWords(settings_, order), log_, runtime::WithParent::kStays);
   stopping_ = false;
   recording_ = order.record;
   end_.reset();

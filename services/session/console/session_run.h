@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "services/base/config/cart.h"
-#include "services/session/supervisor/child_process.h"
+#include "services/base/runtime/child_process.h"
 
 namespace fulcrum::console {
 
@@ -63,7 +63,7 @@ class SessionRun {
  private:
   SessionRunSettings settings_;
   std::filesystem::path log_;
-  supervisor::ChildProcess up_;
+  runtime::ChildProcess up_;
   bool stopping_ = false, recording_ = false;
   std::optional<SessionEnd> end_;
 };

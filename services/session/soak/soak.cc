@@ -12,12 +12,12 @@
 
 #include "services/base/core/error.h"
 #include "services/base/core/tick.h"
+#include "services/base/runtime/child_process.h"
 #include "services/base/runtime/cyclic_thread.h"
 #include "services/base/runtime/realtime.h"
 #include "services/session/soak/process_table.h"
 #include "services/session/soak/script_rounds.h"
 #include "services/session/soak/soak_page.h"
-#include "services/session/supervisor/child_process.h"
 #include "services/session/supervisor/flat_json.h"
 #include "services/session/supervisor/outcome.h"
 #include "services/session/supervisor/progress.h"
@@ -93,7 +93,7 @@ class Soak {
                                    "--seconds", Fixed(total_s_, 1), "--domain", std::to_string(settings.domain),
                                    "--cart",    cart.string()};
     words.insert(words.end(), settings.up.begin(), settings.up.end());
-    up_ = supervisor::ChildProcess::Start(settings.program, words, log_);
+    up_ = runtime::ChildProcess::Start(settings.program, words, log_);
   }
 
   ExitCode Run() {
@@ -283,7 +283,7 @@ class Soak {
   supervisor::Progress progress_;
   std::optional<supervisor::SessionView> view_;  ///< Set when the session has opened its bus.
   std::optional<Listener> listener_;
-  supervisor::ChildProcess up_;
+  runtime::ChildProcess up_;
   std::map<std::string, pid_t> children_;
   std::vector<std::string> nodes_;
   std::vector<Blow> plan_;

@@ -25,7 +25,7 @@ constexpr std::int64_t kAfterShortage = kSecond_ns;
 constexpr auto kPollPeriod = std::chrono::milliseconds(5);
 
 /// True when another start with the same arguments would end the same way.
-bool IsFinal(const ProcessEnd& end) {
+bool IsFinal(const runtime::ProcessEnd& end) {
   const auto code = static_cast<ExitCode>(end.exit_code);
   return end.signal == 0 &&
          (code == ExitCode::kBadUsage || code == ExitCode::kMismatch || code == ExitCode::kDeviceLost);
@@ -34,8 +34,9 @@ bool IsFinal(const ProcessEnd& end) {
 }  // namespace
 
 void NodeProcess::Start(std::int64_t now_ns) {
-  process_ = spare_ && spare_->IsThere() ? spare_->Take()
-                                         : ChildProcess::Start(command_.program, command_.arguments, command_.log);
+  process_ = spare_ && spare_->IsThere()
+                 ? spare_->Take()
+                 : runtime::ChildProcess::Start(command_.program, command_.arguments, command_.log);
   spare_.reset();
   started_ns_ = now_ns;
   pulse_.Start(now_ns);
@@ -74,7 +75,7 @@ std::optional<SupervisedNode::Death> NodeProcess::Update(std::int64_t now_ns) {
       command_.again.clear();
       try {
         Start(now_ns);
-      } catch (const ShortageError& error) {
+      } catch (const runtime::ShortageError& error) {
         due_ns_ = now_ns + kAfterShortage;
         if (std::exchange(lacks_, true)) return std::nullopt;
         return Death{std::string("could not be started (") + error.what() + ")", false, {}, false, 0};
@@ -86,7 +87,7 @@ std::optional<SupervisedNode::Death> NodeProcess::Update(std::int64_t now_ns) {
     }
     return std::nullopt;
   }
-  const std::optional<ProcessEnd> end = process_.Poll();
+  const std::optional<runtime::ProcessEnd> end = process_.Poll();
   if (!end) {
     WatchPulse(now_ns);
     KeepSpare(now_ns);
@@ -116,7 +117,8 @@ std::optional<SupervisedNode::Death> NodeProcess::Update(std::int64_t now_ns) {
   return death;
 }
 
-SupervisedNode::Death NodeProcess::GiveBack(const std::string& why, const ProcessEnd& end, std::int64_t now_ns) {
+SupervisedNode::Death NodeProcess::GiveBack(const std::string& why, const runtime::ProcessEnd& end,
+                                            std::int64_t now_ns) {
   Death death{why + ": the previous program is started again", false, end, false, 0};
   command_ = std::move(*before_);
   before_.reset();

@@ -43,11 +43,11 @@ class NodeProcess final : public SupervisedNode {
   /// Starts a spare once the node runs. A spare that ends is replaced only after the next start of the node.
   void KeepSpare(std::int64_t now_ns);
   /// Starts the previous program again after its replacement ended without a Health.
-  Death GiveBack(const std::string& why, const ProcessEnd& end, std::int64_t now_ns);
+  Death GiveBack(const std::string& why, const runtime::ProcessEnd& end, std::int64_t now_ns);
 
   NodeCommand command_;
   std::optional<NodeCommand> next_, before_;  ///< Of a swap. `before_` is kept until the new program sends Health.
-  ChildProcess process_;
+  runtime::ChildProcess process_;
   std::unique_ptr<SpareProcess> spare_;
   RestartPolicy policy_;
   std::int64_t started_ns_ = 0;

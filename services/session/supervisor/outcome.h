@@ -10,6 +10,7 @@
 #include "services/session/assessment/score.h"
 #include "services/session/supervisor/session_record.h"
 #include "services/session/supervisor/verdict.h"
+#include "services/session/supervisor/video.h"
 
 namespace fulcrum::supervisor {
 
@@ -31,6 +32,7 @@ struct SessionOutcome {
   ExitCode exit_code = ExitCode::kDone;
   /// First recording of all topics; each restart of the recorder adds a file beside it, "-2" and so on. Empty: none.
   std::filesystem::path recording;
+  SessionVideo video;
   std::filesystem::path cut_map;     ///< Picture of what was cut; empty: no recording, or nothing cut.
   std::optional<ScoreSheet> sheet;   ///< None: the scene has no section `assessment`.
   std::string trainee;               ///< Empty: not named.

@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::size_t kSheetFrames = 9;
 constexpr unsigned kSheetShrink = 2;
+constexpr std::uintmax_t kMostEmbedded_B = 32'000'000;
 
 constexpr const char* kStyle = R"css(
 :root { color-scheme: light; --ink: #1d2733; --soft: #5b6876; --line: #dde3ea; --accent: #1f6feb; }
@@ -82,23 +83,42 @@ std::string Picture(const Frame& frame, unsigned shrink) {
          "</figcaption></figure>\n";
 }
 
-/// Section with the video, which is embedded so that the report stays one file.
-std::string Clip(const std::filesystem::path& clip) {
-  std::ifstream in(clip, std::ios::binary);
-  const std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(in), {}};
-  return bytes.empty() ? std::string()
-                       : Tag("h2", "The session as a video") +
-                             "<div class='card'><video controls loop muted src='data:video/mp4;base64," +
-                             Base64(bytes) + "'></video></div>\n";
+std::string Base64Of(const std::string& text) {
+  return Base64({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
-std::string Pictures(const std::filesystem::path& folder, const std::filesystem::path& clip) {
+/// Section with the video of a recorded session. It is embedded, so that the report stays one file, unless it is large.
+std::string Video(const SessionOutcome& outcome) {
+  if (outcome.recording.empty()) return {};
+  const std::string title = Tag("h2", "The session as a video");
+  const SessionVideo& video = outcome.video;
+  if (video.file.empty()) {
+    return video.missing.empty()
+               ? std::string()
+               : title + Tag("p", "There is none: " + video.missing + ". Draw it with: fulcrum log video " +
+                                      outcome.recording.string());
+  }
+  std::error_code unknown;
+  const bool embed = std::filesystem::file_size(video.file, unknown) <= kMostEmbedded_B && !unknown;
+  std::string source = video.file.filename().string();
+  if (embed) {
+    std::ifstream in(video.file, std::ios::binary);
+    source = "data:video/mp4;base64," + Base64Of({std::istreambuf_iterator<char>(in), {}});
+  }
+  std::string chapters;
+  for (const std::string& chapter : video.chapters) chapters += (chapters.empty() ? "" : " · ") + chapter;
+  return title + "<div class='card'><figure><video controls muted src='" + source +
+         "'><track default kind='subtitles' label='events' src='data:text/vtt;base64," + Base64Of(video.subtitles) +
+         "'></video>" + Tag("figcaption", chapters) + "</figure></div>\n";
+}
+
+std::string Pictures(const std::filesystem::path& folder, const SessionOutcome& outcome) {
   const std::vector<Frame> frames = FindFrames(folder);
   if (frames.empty()) {
     return Tag("h2", "Pictures") + Tag("p", "No picture was written in this session.");
   }
   std::string html = Tag("h2", "The last picture") + "<div class='card'>" + Picture(frames.back(), 1) + "</div>\n";
-  html += Clip(clip) + Tag("h2", "Over time") + "<div class='sheet'>\n";
+  html += Video(outcome) + Tag("h2", "Over time") + "<div class='sheet'>\n";
   for (const Frame& frame : Spread(frames, kSheetFrames)) {
     html += Picture(frame, kSheetShrink);
   }
@@ -255,15 +275,15 @@ std::string Events(const SessionRecord& record) {
 
 const char* PageStyle() { return kStyle; }
 
-std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& record, const std::filesystem::path& frames,
-                       const std::filesystem::path& clip) {
+std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& record,
+                       const std::filesystem::path& frames) {
   std::string html =
       "<!doctype html>\n<html lang='en'><head><meta charset='utf-8'>"
       "<meta name='viewport' content='width=device-width, initial-scale=1'><title>Fulcrum · ";
   html += EscapeHtml(outcome.scene_name + " · " + outcome.session_id) + "</title><style>" + kStyle;
   html += "</style></head><body><main>\n";
   html += Header(outcome) + Tiles(record) + (outcome.sheet ? SheetHtml(*outcome.sheet, outcome.trainee) : "") +
-          Pictures(frames, clip) + CutMap(outcome.cut_map) + Plots(outcome, record) + Nodes(outcome, record) +
+          Pictures(frames, outcome) + CutMap(outcome.cut_map) + Plots(outcome, record) + Nodes(outcome, record) +
           Faults(outcome) + Restarts(record) + Refusals(record) + Events(record);
   if (!outcome.recording.empty()) {
     html += Tag("h2", "Recording") + Tag("p", "All topics: " + outcome.recording.string() + ", " +

@@ -13,8 +13,7 @@ namespace fulcrum::supervisor {
 
 /// The text of report.html. Takes long, because it reads and encodes PNG files.
 /// @param frames folder of the pictures.
-/// @param clip MP4 of the pictures; may be missing.
 [[nodiscard]] std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& record,
-                                     const std::filesystem::path& frames, const std::filesystem::path& clip);
+                                     const std::filesystem::path& frames);
 
 }  // namespace fulcrum::supervisor

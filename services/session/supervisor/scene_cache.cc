@@ -13,8 +13,8 @@
 
 #include "services/base/core/error.h"
 #include "services/base/core/hash.h"
+#include "services/base/runtime/child_process.h"
 #include "services/base/runtime/realtime.h"
-#include "services/session/supervisor/child_process.h"
 
 namespace fulcrum::supervisor {
 namespace {
@@ -107,7 +107,7 @@ void Compile(const SceneRequest& request, const fs::path& yaml, const fs::path& 
   }
   std::printf("compiling scene %s ...\n", yaml.filename().c_str());
   std::fflush(stdout);
-  ChildProcess compiler = ChildProcess::Start(request.compiler, arguments, log);
+  runtime::ChildProcess compiler = runtime::ChildProcess::Start(request.compiler, arguments, log);
   for (;;) {
     if (const auto end = compiler.Poll()) {
       if (end->signal != 0 || end->exit_code != 0) {

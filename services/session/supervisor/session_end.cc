@@ -6,13 +6,13 @@
 
 #include "services/base/core/error.h"
 #include "services/records/log_tools/merge.h"
-#include "services/session/supervisor/clip.h"
 #include "services/session/supervisor/cut_map_file.h"
 #include "services/session/supervisor/report.h"
 #include "services/session/supervisor/score_sheet.h"
 #include "services/session/supervisor/script_outlook.h"
 #include "services/session/supervisor/session_folder.h"
 #include "services/session/supervisor/training_log.h"
+#include "services/session/supervisor/video.h"
 
 namespace fulcrum::supervisor {
 namespace {
@@ -57,6 +57,19 @@ std::string JoinRecordings(const SessionSetup& setup) {
   return done.empty() ? done : done + "\n";
 }
 
+/// The video of a recorded session with pictures.
+SessionVideo VideoOf(const SessionSetup& setup, const Wait& wait) {
+  const bool drawn = (setup.scene.view().node_mask >> static_cast<unsigned>(NodeId::kRender) & 1u) != 0;
+  if (setup.recording.empty() || !setup.settings.video || !drawn) return {};
+  wait.say("drawing the video of the session; Ctrl-C leaves it out");
+  return MakeVideo({.replayer = setup.settings.programs / "replayer",
+                    .recording = setup.recording,
+                    .scene = setup.settings.scene,
+                    .video = setup.folder.path / "video.mp4",
+                    .log = setup.folder.logs / "video.log"},
+                   wait.goes_on);
+}
+
 }  // namespace
 
 Verdict::Session VerdictSession(const SessionSetup& setup) {
@@ -82,11 +95,11 @@ void Judge(const SessionSetup& setup, const SessionNodes& nodes, const SessionRe
 }
 
 std::string WriteResults(SessionSetup* setup, const SessionRecord& record, double reached_s,
-                         const std::optional<ScoreSheet>& sheet, Verdict* verdict) {
+                         const std::optional<ScoreSheet>& sheet, Verdict* verdict, const Wait& wait) {
   const SessionFolder& folder = setup->folder;
   SessionOutcome outcome = OutcomeOf(*setup, reached_s);
   outcome.sheet = sheet;
-  const std::filesystem::path clip = folder.path / "clip.mp4", report = folder.path / "report.html";
+  const std::filesystem::path report = folder.path / "report.html";
   if (sheet) {
     Try(reached_s, verdict, [&] {
       WriteFile(folder.path / "assessment.json",
@@ -101,13 +114,13 @@ std::string WriteResults(SessionSetup* setup, const SessionRecord& record, doubl
   std::string joined;
   Try(reached_s, verdict, [&] { joined = JoinRecordings(*setup); });
   Try(reached_s, verdict, [&] { outcome.cut_map = WriteCutMap(setup->recording, setup->scene.view(), folder.path); });
-  Try(reached_s, verdict, [&] { (void)MakeClip(folder.frames, clip, folder.logs / "clip.log"); });
+  Try(reached_s, verdict, [&] { outcome.video = VideoOf(*setup, wait); });
   // Written again when one of them cannot be written, so that the other one says so.
   std::size_t known = 0;
   do {
     known = verdict->faults().size();
     SetVerdict(*verdict, &outcome);
-    Try(reached_s, verdict, [&] { WriteFile(report, ReportHtml(outcome, record, folder.frames, clip)); });
+    Try(reached_s, verdict, [&] { WriteFile(report, ReportHtml(outcome, record, folder.frames)); });
     Try(reached_s, verdict, [&] { WriteFile(folder.path / "summary.json", SummaryJson(outcome, record)); });
   } while (verdict->faults().size() != known);
   return "\n" + FinalTable(outcome, record) + joined + "report: " + report.string();

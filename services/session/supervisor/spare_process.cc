@@ -19,7 +19,8 @@ SpareProcess::SpareProcess(const NodeCommand& command) {
     throw InputError("no pipe for a spare " + command.program.string() + ": " + ::strerror(errno));
   }
   try {
-    process_ = ChildProcess::Start(command.program, arguments, command.log, WithParent::kDies, pipe[0]);
+    process_ =
+        runtime::ChildProcess::Start(command.program, arguments, command.log, runtime::WithParent::kDies, pipe[0]);
   } catch (...) {
     ::close(pipe[0]);
     ::close(pipe[1]);
@@ -36,7 +37,7 @@ bool SpareProcess::IsThere() {
   return process_.running();
 }
 
-ChildProcess SpareProcess::Take() {
+runtime::ChildProcess SpareProcess::Take() {
   const char needed = 1;
   [[maybe_unused]] const ssize_t written = ::write(call_, &needed, 1);
   return std::move(process_);

@@ -18,10 +18,10 @@ class SpareProcess {
   [[nodiscard]] bool IsThere();
   /// Signals the spare to become the node and hands its process to the caller. A spare that is still preparing its
   /// start becomes the node as soon as it is ready.
-  [[nodiscard]] ChildProcess Take();
+  [[nodiscard]] runtime::ChildProcess Take();
 
  private:
-  ChildProcess process_;
+  runtime::ChildProcess process_;
   int call_ = -1;  ///< Its standard input.
 };
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "services/base/core/messages.h"
-#include "services/session/supervisor/child_process.h"
+#include "services/base/runtime/child_process.h"
 
 namespace fulcrum::supervisor {
 
@@ -34,7 +34,7 @@ class SupervisedNode {
   struct Death {
     std::string cause;
     bool for_good = false;
-    ProcessEnd end;
+    runtime::ProcessEnd end;
     bool asked = false;      ///< The node ended by command (AskRestart, Swap).
     std::int64_t at_ns = 0;  ///< Time of the death; 0: now.
   };

@@ -318,7 +318,13 @@ struct Supervisor::Impl {
     Judge(setup, *nodes, record, clock.reached_s(), &verdict);
     SayFaults();
     const auto sheet = assessed ? std::optional(assessed->Finish()) : std::nullopt;
-    const std::string results = WriteResults(&setup, record, clock.reached_s(), sheet, &verdict);
+    const Wait wait{.say = [this](const std::string& line) { status.Say(line); },
+                    .goes_on =
+                        [this, signals = runtime::StopSignals()] {
+                          status.Update(runtime::MonotonicNs());
+                          return runtime::StopSignals() == signals;
+                        }};
+    const std::string results = WriteResults(&setup, record, clock.reached_s(), sheet, &verdict, wait);
     SayFaults();  // Of files that could not be written.
     status.Say(results);
   }

@@ -22,6 +22,7 @@ struct UpSettings {
   std::string quality = "auto";  ///< Quality of the picture: auto, low, high.
   /// File of the recording of all topics. A folder: <session>.mcap in it. Empty: recording.mcap in the session folder.
   std::optional<std::filesystem::path> record;
+  bool video = true;  ///< A recorded session is drawn as a video at its end.
   /// Time [s] that a dump covers: the recorder keeps the newest samples in memory and writes them into a separate file
   /// when a node dies or a dump is requested. 0: no dumps.
   double keep_s = 0;

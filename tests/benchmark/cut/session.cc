@@ -295,7 +295,8 @@ std::optional<log_tools::CutMap> SessionRunner::RunScene(const std::string& name
 std::optional<log_tools::CutMap> SessionRunner::RunFiles(const std::string& name, const fs::path& scene,
                                                          const fs::path& cart, double seconds, bool loaded, int kills) {
   const fs::path out = folder_ / name;
-  std::vector<std::string> arguments{"up", scene, "--record", "--domain", std::to_string(domain_), "--out", out};
+  std::vector<std::string> arguments{"up",    scene, "--record", "--no-video", "--domain", std::to_string(domain_),
+                                     "--out", out};
   if (!cart.empty()) arguments.insert(arguments.end(), {"--cart", cart});
   std::optional<int> code;
   std::string said;

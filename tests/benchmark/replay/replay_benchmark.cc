@@ -2,8 +2,11 @@
 //
 //   replay.hash_mismatches    states that differ, of physics, thermal and haptics over the whole recording
 //   replay.states_compared
+//   video.fps_p50, video.s_per_session_s   of the session as a video
 //   replay.speed_x_realtime   physics and thermal together, physics on as many threads as there are cores
+#include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -20,6 +23,17 @@ constexpr double kPatience_s = 120;
 int Fail(const char* what, const std::string& said) {
   std::fprintf(stderr, "bench_replay: %s\n%s", what, said.c_str());
   return 1;
+}
+
+bool MakeVideo(const std::filesystem::path& recording, benchmark::Report* report) {
+  const auto begin = std::chrono::steady_clock::now();
+  const auto video = recording.parent_path() / "video.mp4";
+  const auto run = testing::Replay(recording, {"--video", video}, kPatience_s);
+  const std::chrono::duration<double> used = std::chrono::steady_clock::now() - begin;
+  if (run.exit_code != 0) return Fail("there is no video", run.said) == 0;
+  report->Add("video.fps_p50", run.figures.at("draw_rate_Hz"), "1/s");
+  report->Add("video.s_per_session_s", used.count() / run.figures.at("duration_s"), "1");
+  return true;
 }
 
 int Run(benchmark::Report* report) {
@@ -45,7 +59,7 @@ int Run(benchmark::Report* report) {
     speeds.push_back(run.figures.at("speed_x_realtime"));
   }
   report->Add("replay.speed_x_realtime", benchmark::Quantile(speeds, 0.5), "1");
-  return all.exit_code;
+  return MakeVideo(recording, report) && all.exit_code == 0 ? 0 : 1;
 }
 
 }  // namespace
@@ -53,5 +67,5 @@ int Run(benchmark::Report* report) {
 
 int main(int argc, char** argv) {
   fulcrum::benchmark::Report report(argc, argv);
-  return report.Wants("replay.") ? fulcrum::Run(&report) : 0;
+  return report.Wants("replay.") || report.Wants("video.") ? fulcrum::Run(&report) : 0;
 }

@@ -1,6 +1,8 @@
 // The replayer's pictures: a recorded session drawn twice.
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <iterator>
 #include <map>
@@ -11,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "services/apps/replayer/projector.h"
+#include "services/apps/replayer/video.h"
 #include "tests/integration/replay/short_session.h"
 #include "tests/support/cart.h"
 #include "tests/support/program.h"
@@ -82,6 +86,78 @@ TEST(Film, EndsAtALineThatIsNoTime) {
   fulcrum::testing::WaitFor(kPicturePatience_s, [&] { return (code = replayer.Poll()).has_value(); });
   EXPECT_EQ(code, 2);
   EXPECT_NE(replayer.Said().find("\"soon\" is no session time"), std::string::npos);
+}
+
+/// Output of a program that ends well.
+std::string OutputOf(const std::string& program, const std::vector<std::string>& arguments) {
+  fulcrum::testing::Program run(program, arguments);
+  std::optional<int> code;
+  fulcrum::testing::WaitFor(kPicturePatience_s, [&] { return (code = run.Poll()).has_value(); });
+  EXPECT_EQ(code, 0) << program << ": " << run.Said();
+  return run.Said();
+}
+
+std::ptrdiff_t Files(const std::filesystem::path& folder) {
+  return std::distance(std::filesystem::directory_iterator(folder), {});
+}
+
+TEST(Video, ShowsEachTimeOfTheSession) {
+  const testing::ShortSession session("video_test", {.seconds = 1.6}, Small);
+  const std::filesystem::path video = session.folder() / "video.mp4", again = session.folder() / "again.mp4";
+  const auto before = Files(session.folder());
+  OutputOf("fulcrum", {"log", "video", session.recording()});
+  OutputOf("replayer", {session.recording(), "--video", again, "--json", session.folder() / "video.json"});
+  const std::string bytes = fulcrum::testing::ReadFile(video);
+  EXPECT_TRUE(fulcrum::testing::ReadFile(again) == bytes) << "a second run";
+  EXPECT_LT(bytes.find("moov"), bytes.find("mdat")) << "the index comes first";
+  EXPECT_EQ(Files(session.folder()), before + 3) << "two videos and JSON: no other file remains";
+
+  const std::string streams =
+      OutputOf("/usr/bin/ffprobe", {"-v", "error", "-select_streams", "v", "-show_streams", "-show_chapters", video});
+  EXPECT_NE(streams.find("codec_name=h264\n"), std::string::npos) << streams;
+  EXPECT_NE(streams.find("avg_frame_rate=30/1\n"), std::string::npos) << streams;
+  EXPECT_NE(streams.find("TAG:title=start\n"), std::string::npos) << streams;
+
+  // Pictures of the file against those that are drawn for their time.
+  Projector projector(session.recording(), session.scene());
+  const auto count = static_cast<std::size_t>(projector.end_s() * kVideoRate_Hz + 1e-6) + 1;
+  EXPECT_NE(streams.find("nb_frames=" + std::to_string(count) + "\n"), std::string::npos) << streams;
+  const std::filesystem::path decoded = session.folder() / "decoded.rgb";
+  OutputOf("/usr/bin/ffmpeg",
+           {"-v", "error", "-i", video, "-vf", "vflip", "-f", "rawvideo", "-pix_fmt", "rgb24", decoded});
+  const std::string pixels = fulcrum::testing::ReadFile(decoded);
+  render::Bitmap drawn;
+  const auto difference = [&](std::size_t picture) {
+    const std::size_t begin = picture * drawn.rgb.size();
+    double sum = 0;
+    for (std::size_t i = 0; i < drawn.rgb.size(); ++i) {
+      sum += std::abs(int{drawn.rgb[i]} - int{static_cast<std::uint8_t>(pixels[begin + i])});
+    }
+    return sum / static_cast<double>(drawn.rgb.size());
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    projector.GoTo(static_cast<double>(i) / kVideoRate_Hz);
+    (void)projector.Draw(&drawn);
+    ASSERT_EQ(pixels.size(), count * drawn.rgb.size());
+    EXPECT_LT(difference(i), 3) << "of 255, in the mean of picture " << i;
+  }
+  EXPECT_GT(difference(0), 3) << "the last picture is not the first";
+}
+
+TEST(Video, SaysWhyThereIsNone) {
+  const testing::ShortSession session("no_video_test", {.seconds = 0.5}, Small);
+  const auto expect = [&](int wanted, const std::vector<std::string>& arguments, const std::string& words) {
+    std::vector<std::string> all{session.recording()};
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    fulcrum::testing::Program run("replayer", all);
+    std::optional<int> code;
+    fulcrum::testing::WaitFor(kPicturePatience_s, [&] { return (code = run.Poll()).has_value(); });
+    EXPECT_EQ(code, wanted) << run.Said();
+    EXPECT_NE(run.Said().find(words), std::string::npos) << run.Said();
+  };
+  expect(2, {"--video", session.folder() / "missing" / "video.mp4"}, "cannot write");
+  expect(2, {"--video", "video.mp4", "--within", "-1"}, "--within");
+  expect(2, {"--video", "video.mp4", "--film"}, "give one of");
 }
 
 TEST(IntoRender, DrawsTheSamePicturesToTheLastByte) {

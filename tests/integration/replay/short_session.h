@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "services/scene/builder/build.h"
@@ -29,8 +30,8 @@ class ShortSession {
     scene::SceneData data = scene::BuildProcedural(scene::Small());
     change(&data);
     scene::WriteSceneFile(data, "", folder_ / "scene.fulcrum");
-    const scene::SceneFile scene(folder_ / "scene.fulcrum");
-    cut_length_m_ = RecordCart(scene.view(), folder_, story);
+    scene_.emplace(folder_ / "scene.fulcrum");
+    cut_length_m_ = RecordCart(scene_->view(), folder_, story);
   }
   ~ShortSession() { std::filesystem::remove_all(folder_); }
   ShortSession(const ShortSession&) = delete;
@@ -38,10 +39,12 @@ class ShortSession {
 
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
   [[nodiscard]] std::filesystem::path recording() const { return folder_ / "recording.mcap"; }
+  [[nodiscard]] const SceneView& scene() const { return scene_->view(); }
   [[nodiscard]] float cut_length_m() const { return cut_length_m_; }
 
  private:
   std::filesystem::path folder_;
+  std::optional<scene::SceneFile> scene_;
   float cut_length_m_ = 0;
 };
 

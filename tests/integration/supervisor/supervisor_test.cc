@@ -16,10 +16,10 @@
 #include <vector>
 
 #include "services/base/core/messages.h"
+#include "services/base/runtime/child_process.h"
 #include "services/base/runtime/cyclic_thread.h"
 #include "services/scene/builder/build.h"
 #include "services/scene/format/scene_file.h"
-#include "services/session/supervisor/child_process.h"
 #include "services/session/supervisor/node_process.h"
 #include "services/transport/bus/dds/participant.h"
 #include "services/transport/bus/input_account.h"
@@ -73,17 +73,17 @@ class SupervisorTest : public ::testing::Test {
   void Order(NodeId node, const std::string& what) const {
     std::ofstream(folder_ / "out" / (std::string(NodeName(node)) + ".do")) << what << "\n";
   }
-  ChildProcess Fulcrum(std::vector<std::string> words) const {
+  runtime::ChildProcess Fulcrum(std::vector<std::string> words) const {
     words.insert(words.end(), {"--domain", std::to_string(kDomain)});
-    return ChildProcess::Start(folder_ / "bin" / "fulcrum", words, folder_ / "fulcrum.log");
+    return runtime::ChildProcess::Start(folder_ / "bin" / "fulcrum", words, folder_ / "fulcrum.log");
   }
-  ChildProcess Up(std::vector<std::string> more = {}) const {
+  runtime::ChildProcess Up(std::vector<std::string> more = {}) const {
     // No identity of a keyed bus has the rights for the ports of the fake node.
     std::vector<std::string> words{"up", scene_.string(), "--out", (folder_ / "out").string(), "--open-bus"};
     words.insert(words.end(), more.begin(), more.end());
     return Fulcrum(words);
   }
-  static ProcessEnd Wait(ChildProcess* process) {
+  static runtime::ProcessEnd Wait(runtime::ChildProcess* process) {
     for (;;) {
       if (const auto end = process->Poll()) {
         return *end;
@@ -143,7 +143,7 @@ class SupervisorTest : public ::testing::Test {
   }
 
   /// Publishes in place of haptics and physics: tool 0 moves in a circle at 40 mm/s, tool 1 presses with 12.5 N.
-  static ProcessEnd PublishMotion(ChildProcess* until_end) {
+  static runtime::ProcessEnd PublishMotion(runtime::ChildProcess* until_end) {
     bus::DdsParticipant bus(testing::WriterOf(kDomain, "hands"));
     const auto tools = bus.MakeOutput<ToolState>();
     const auto models = bus.MakeOutput<ContactModel>();
@@ -174,7 +174,7 @@ class SupervisorTest : public ::testing::Test {
 };
 
 TEST_F(SupervisorTest, RunsForTheTimeAskedAndLeavesReportAndNothingElse) {
-  ChildProcess up = Up({"--seconds", "1"});
+  runtime::ChildProcess up = Up({"--seconds", "1"});
   EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
   EXPECT_EQ(SharedMemory(), std::vector<std::string>{});
   for (const char* file : {"summary.json", "report.html", "configuration.yaml", "cart.yaml", "scene.fulcrum"}) {
@@ -190,7 +190,7 @@ TEST_F(SupervisorTest, RunsForTheTimeAskedAndLeavesReportAndNothingElse) {
 }
 
 TEST_F(SupervisorTest, KilledNodeIsRestartedRejoinsAndTheRunEndsWell) {
-  ChildProcess up = Up();
+  runtime::ChildProcess up = Up();
   ASSERT_TRUE(WaitUntil([&] { return AllJoined(); })) << Log();
   const auto pids = PidsOf(NodeId::kPhysics);
   ASSERT_EQ(pids.size(), 1u);
@@ -208,7 +208,7 @@ TEST_F(SupervisorTest, KilledNodeIsRestartedRejoinsAndTheRunEndsWell) {
 
 TEST_F(SupervisorTest, CrashLoopEndsTheSessionWithTheCause) {
   Order(NodeId::kThermal, "crash");
-  ChildProcess up = Up();
+  runtime::ChildProcess up = Up();
   EXPECT_EQ(Wait(&up).exit_code, 1) << Log();
   EXPECT_NE(Log().find("thermal_node killed by signal 6"), std::string::npos) << Log();
   EXPECT_NE(Log().find("for good"), std::string::npos) << Log();
@@ -218,7 +218,7 @@ TEST_F(SupervisorTest, CrashLoopEndsTheSessionWithTheCause) {
 
 TEST_F(SupervisorTest, KeepGoingRunsOnWithoutTheNodeThatFailed) {
   Order(NodeId::kThermal, "exit 4");
-  ChildProcess up = Up({"--seconds", "1", "--keep-going"});
+  runtime::ChildProcess up = Up({"--seconds", "1", "--keep-going"});
   EXPECT_EQ(Wait(&up).exit_code, 4) << Log();
   EXPECT_TRUE(Joined(NodeId::kPhysics)) << Log();
   EXPECT_NE(ReadAll(Session() / "summary.json").find("\"thermal_node.failed\": true"), std::string::npos);
@@ -226,7 +226,7 @@ TEST_F(SupervisorTest, KeepGoingRunsOnWithoutTheNodeThatFailed) {
 
 TEST_F(SupervisorTest, MismatchIsNotTriedAgain) {
   Order(NodeId::kPhysics, "mismatch");
-  ChildProcess up = Up();
+  runtime::ChildProcess up = Up();
   EXPECT_EQ(Wait(&up).exit_code, 3) << Log();
   EXPECT_NE(Log().find("the scene is another one"), std::string::npos) << Log();
   EXPECT_EQ(Count(Log(), "starting it again"), 0u) << Log();
@@ -234,7 +234,7 @@ TEST_F(SupervisorTest, MismatchIsNotTriedAgain) {
 
 TEST_F(SupervisorTest, NodeThatHangsInItsStepStillEndsWithTheSession) {
   Order(NodeId::kPhysics, "hang");
-  ChildProcess up = Up();
+  runtime::ChildProcess up = Up();
   ASSERT_TRUE(WaitUntil([&] { return Count(NodeLog(NodeId::kPhysics), "hanging") == 1; })) << Log();
   up.Signal(SIGTERM);
   EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
@@ -243,21 +243,21 @@ TEST_F(SupervisorTest, NodeThatHangsInItsStepStillEndsWithTheSession) {
 }
 
 TEST_F(SupervisorTest, ChildrenDieWithAKilledSupervisorAndNothingIsLeft) {
-  ChildProcess up = Up();
+  runtime::ChildProcess up = Up();
   ASSERT_TRUE(WaitUntil([&] { return AllJoined(); })) << Log();
   up.Signal(SIGKILL);
   Wait(&up);
   EXPECT_TRUE(WaitUntil([&] { return PidsOf(NodeId::kPhysics).empty() && PidsOf(NodeId::kThermal).empty(); }));
   EXPECT_TRUE(WaitUntil([&] { return SharedMemory().empty(); })) << "the watching process has swept it";
-  ChildProcess again = Up({"--seconds", "0.5"});
+  runtime::ChildProcess again = Up({"--seconds", "0.5"});
   EXPECT_EQ(Wait(&again).exit_code, 0) << Log();
   EXPECT_EQ(SharedMemory(), std::vector<std::string>{});
 }
 
 TEST_F(SupervisorTest, SecondSessionInTheSameDomainIsRefused) {
-  ChildProcess up = Up();
+  runtime::ChildProcess up = Up();
   ASSERT_TRUE(WaitUntil([&] { return AllJoined(); })) << Log();
-  ChildProcess second = Up();
+  runtime::ChildProcess second = Up();
   EXPECT_EQ(Wait(&second).exit_code, 2) << Log();
   EXPECT_NE(Log().find("a session runs in domain 21"), std::string::npos) << Log();
   up.Signal(SIGTERM);
@@ -265,30 +265,30 @@ TEST_F(SupervisorTest, SecondSessionInTheSameDomainIsRefused) {
 }
 
 TEST_F(SupervisorTest, StatusRestartAndDownReachTheSupervisor) {
-  ChildProcess up = Up();
+  runtime::ChildProcess up = Up();
   ASSERT_TRUE(WaitUntil([&] { return AllJoined(); })) << Log();
-  ChildProcess status = Fulcrum({"status"});
+  runtime::ChildProcess status = Fulcrum({"status"});
   EXPECT_EQ(Wait(&status).exit_code, 0) << Log();
   EXPECT_NE(Log().find("scene \"tiny\""), std::string::npos) << Log();
   EXPECT_NE(Log().find("thermal_node"), std::string::npos) << Log();
 
-  ChildProcess restart = Fulcrum({"restart", "thermal_node"});
+  runtime::ChildProcess restart = Fulcrum({"restart", "thermal_node"});
   EXPECT_EQ(Wait(&restart).exit_code, 0) << Log();
   EXPECT_TRUE(WaitUntil([&] { return Joined(NodeId::kThermal, 2); })) << Log();
-  ChildProcess unknown = Fulcrum({"restart", "kitchen_node"});
+  runtime::ChildProcess unknown = Fulcrum({"restart", "kitchen_node"});
   EXPECT_EQ(Wait(&unknown).exit_code, 1) << Log();
 
-  ChildProcess down = Fulcrum({"down"});
+  runtime::ChildProcess down = Fulcrum({"down"});
   EXPECT_EQ(Wait(&down).exit_code, 0) << Log();
   EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
-  ChildProcess nothing = Fulcrum({"down"});
+  runtime::ChildProcess nothing = Fulcrum({"down"});
   EXPECT_EQ(Wait(&nothing).exit_code, 2) << Log();
 }
 
 TEST_F(SupervisorTest, ADegradedNodeHasTheNewestPastDumpedOnce) {
   fs::copy_file(fs::path(FULCRUM_BIN_DIR) / "recorder", folder_ / "bin" / "recorder");
   Order(NodeId::kThermal, "flicker");
-  ChildProcess up = Up({"--seconds", "1.5", "--keep-last", "30"});
+  runtime::ChildProcess up = Up({"--seconds", "1.5", "--keep-last", "30"});
   EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
   EXPECT_EQ(Count(NodeLog(NodeId::kRecorder), "dump.mcap: thermal_node is degraded: a plug is loose"), 1u)
       << NodeLog(NodeId::kRecorder);
@@ -299,10 +299,10 @@ TEST_F(SupervisorTest, ADegradedNodeHasTheNewestPastDumpedOnce) {
 
 TEST_F(SupervisorTest, ADegradedNodeAfterACommandIsNoFault) {
   fs::copy_file(fs::path(FULCRUM_BIN_DIR) / "recorder", folder_ / "bin" / "recorder");
-  ChildProcess up = Up({"--keep-last", "30"});
+  runtime::ChildProcess up = Up({"--keep-last", "30"});
   ASSERT_TRUE(WaitUntil([&] { return AllJoined(); })) << Log();
   Order(NodeId::kThermal, "flicker");
-  ChildProcess restart = Fulcrum({"restart", "thermal_node"});
+  runtime::ChildProcess restart = Fulcrum({"restart", "thermal_node"});
   EXPECT_EQ(Wait(&restart).exit_code, 0) << Log();
   ASSERT_TRUE(WaitUntil([&] { return Joined(NodeId::kThermal, 2); })) << Log();
   std::this_thread::sleep_for(500ms);
@@ -317,23 +317,23 @@ TEST_F(SupervisorTest, SwapReplacesANodeAndABadReplacementGivesItBack) {
   const fs::path other = folder_ / "other" / NodeName(NodeId::kThermal);
   fs::create_directory(folder_ / "other");
   fs::create_symlink(fs::path(FULCRUM_BIN_DIR) / "supervisor_fake_node", other);
-  ChildProcess up = Up({"--allow-swap-command"});
+  runtime::ChildProcess up = Up({"--allow-swap-command"});
   ASSERT_TRUE(WaitUntil([&] { return AllJoined(); })) << Log();
   const std::vector<pid_t> before = PidsOf(NodeId::kThermal);
   ASSERT_EQ(before.size(), 1u);
 
-  ChildProcess nonsense = Fulcrum({"swap", "thermal_node", "--with", "/nonexistent"});
+  runtime::ChildProcess nonsense = Fulcrum({"swap", "thermal_node", "--with", "/nonexistent"});
   EXPECT_EQ(Wait(&nonsense).exit_code, 1) << Log();
   EXPECT_NE(Log().find("/nonexistent: is not an executable program; nothing was changed"), std::string::npos) << Log();
   EXPECT_EQ(PidsOf(NodeId::kThermal), before);
 
-  ChildProcess swap = Fulcrum({"swap", "thermal_node", "--with", other.string()});
+  runtime::ChildProcess swap = Fulcrum({"swap", "thermal_node", "--with", other.string()});
   EXPECT_EQ(Wait(&swap).exit_code, 0) << Log();
   ASSERT_TRUE(WaitUntil([&] { return Joined(NodeId::kThermal, 2); })) << Log();
   EXPECT_TRUE(PidsOf(NodeId::kThermal).empty()) << "the other build runs, and nothing else";
   EXPECT_EQ(Count(Log(), "thermal_node was replaced by command"), 1u) << Log();
 
-  ChildProcess bad = Fulcrum({"swap", "thermal_node", "--with", "/bin/false"});
+  runtime::ChildProcess bad = Fulcrum({"swap", "thermal_node", "--with", "/bin/false"});
   EXPECT_EQ(Wait(&bad).exit_code, 0) << Log();
   ASSERT_TRUE(WaitUntil([&] { return Joined(NodeId::kThermal, 3); })) << Log();
   EXPECT_NE(Log().find("thermal_node was replaced by /bin/false, which ended with exit code 1"), std::string::npos)
@@ -343,7 +343,7 @@ TEST_F(SupervisorTest, SwapReplacesANodeAndABadReplacementGivesItBack) {
   const fs::path text = folder_ / "other" / "text";
   std::ofstream(text) << "not a program";
   fs::permissions(text, fs::perms::owner_all);
-  ChildProcess worse = Fulcrum({"swap", "thermal_node", "--with", text.string()});
+  runtime::ChildProcess worse = Fulcrum({"swap", "thermal_node", "--with", text.string()});
   EXPECT_EQ(Wait(&worse).exit_code, 0) << Log();
   ASSERT_TRUE(WaitUntil([&] { return Joined(NodeId::kThermal, 4); })) << Log();
   EXPECT_NE(Log().find("cannot start " + text.string()), std::string::npos) << Log();
@@ -365,7 +365,7 @@ TEST_F(SupervisorTest, ScriptThatAsksForACutWithoutOneIsAFailure) {
   const Vec3f here = data.fixed.tools[1].p_WP - Vec3f(0, 0, 0.05f);
   data.script = {{0, 1, here, 0, kPedalCut, 35}, {4, 1, here, 0, kPedalNone, 0}};
   scene::WriteSceneFile(data, "name: tiny\n", scene_);
-  ChildProcess up = Up();
+  runtime::ChildProcess up = Up();
   EXPECT_EQ(Wait(&up).exit_code, 1) << Log();
   EXPECT_NE(Log().find("nothing was cut"), std::string::npos) << Log();
 }
@@ -373,7 +373,7 @@ TEST_F(SupervisorTest, ScriptThatAsksForACutWithoutOneIsAFailure) {
 TEST_F(SupervisorTest, AssessedSessionIsScoredAndRemembered) {
   const std::string database = (folder_ / "trainees.sqlite").string();
   const auto end_of = [&](const std::vector<std::string>& words) {
-    ChildProcess up = Up(words);
+    runtime::ChildProcess up = Up(words);
     return Wait(&up).exit_code;
   };
   EXPECT_EQ(end_of({"--seconds", "1", "--trainee", "Ann", "--database", database}), 2);
@@ -383,7 +383,7 @@ TEST_F(SupervisorTest, AssessedSessionIsScoredAndRemembered) {
   scene::SceneData data = TinyScene(1u << static_cast<unsigned>(NodeId::kPhysics));
   data.fixed.assessment.on = 1;
   scene::WriteSceneFile(data, "name: tiny\n", scene_);
-  ChildProcess up = Up({"--seconds", "3", "--trainee", "Ann", "--database", database});
+  runtime::ChildProcess up = Up({"--seconds", "3", "--trainee", "Ann", "--database", database});
   EXPECT_EQ(PublishMotion(&up).exit_code, 0) << Log();
   EXPECT_NE(Log().find("! force too high · score "), std::string::npos) << Log();
   const std::string json = ReadAll(Session() / "assessment.json");
@@ -401,7 +401,8 @@ TEST_F(SupervisorTest, AssessedSessionIsScoredAndRemembered) {
   const auto trainee = [&](std::vector<std::string> words) {
     words.insert(words.begin(), "trainee");
     words.insert(words.end(), {"--database", database});
-    ChildProcess process = ChildProcess::Start(folder_ / "bin" / "fulcrum", words, folder_ / "trainee.log");
+    runtime::ChildProcess process =
+        runtime::ChildProcess::Start(folder_ / "bin" / "fulcrum", words, folder_ / "trainee.log");
     return Wait(&process).exit_code;
   };
   EXPECT_EQ(trainee({"Ann", "--svg", (folder_ / "ann.svg").string()}), 0);
@@ -428,7 +429,7 @@ TEST_F(SupervisorTest, BadUseSaysWhatIsWrong) {
       {{"jump"}, "unknown command"},
   };
   for (const auto& [words, expected] : cases) {
-    ChildProcess fulcrum = Fulcrum(words);
+    runtime::ChildProcess fulcrum = Fulcrum(words);
     EXPECT_EQ(Wait(&fulcrum).exit_code, 2) << expected;
     EXPECT_NE(Log().find(expected), std::string::npos) << Log();
   }

@@ -125,7 +125,7 @@ TEST_F(InstallTest, BillOfMaterialsNamesWhatIsLinkedAndCompiledIn) {
   // The libraries that dpkg-shlibdeps has found in the programs are listed, too.
   const std::string depends = Output("/usr/bin/dpkg-deb", {"-f", package_, "Depends"});
   for (const std::string& word : testing::SplitWords(std::regex_replace(depends, std::regex(R"(\([^)]*\)|,)"), ""))) {
-    if (word == "|" || word.starts_with("systemd")) continue;
+    if (word == "|" || word == "ffmpeg" || word.starts_with("systemd")) continue;  // Started, not linked.
     EXPECT_TRUE(relations.contains("SPDXRef-Package-fulcrum DEPENDS_ON " + ids[word])) << word;
   }
   for (const char* program : {"fulcrum", "physics_node", "recorder"}) {

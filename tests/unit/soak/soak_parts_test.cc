@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "services/base/runtime/child_process.h"
 #include "services/scene/builder/build.h"
 #include "services/scene/format/scene_file.h"
 #include "services/session/soak/chaos_plan.h"
@@ -13,7 +14,6 @@
 #include "services/session/soak/script_rounds.h"
 #include "services/session/soak/soak_page.h"
 #include "services/session/soak/soak_record.h"
-#include "services/session/supervisor/child_process.h"
 
 namespace fulcrum::soak {
 namespace {
@@ -87,7 +87,7 @@ TEST(ScriptRounds, TheSceneOfRoundsIsValidAndOtherwiseTheSame) {
 }
 
 TEST(ProcessTable, KnowsChildrenAndWhatTheyHold) {
-  auto child = supervisor::ChildProcess::Start("/bin/sleep", {"20"}, "/dev/null");
+  auto child = runtime::ChildProcess::Start("/bin/sleep", {"20"}, "/dev/null");
   EXPECT_GT(ResidentBytes(::getpid()).value_or(0), 1'000'000u);
   std::map<std::string, pid_t> children;
   // Until the shell has become `sleep`.

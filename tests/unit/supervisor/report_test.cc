@@ -1,4 +1,4 @@
-// Summary, table, pictures, clip and report from the data of a session.
+// Summary, table, pictures, video and report from the data of a session.
 #include "services/session/supervisor/report.h"
 
 #include <gtest/gtest.h>
@@ -15,13 +15,13 @@
 #include <string_view>
 #include <vector>
 
-#include "services/session/supervisor/clip.h"
 #include "services/session/supervisor/outcome.h"
 #include "services/session/supervisor/picture.h"
 #include "services/session/supervisor/progress.h"
 #include "services/session/supervisor/script_outlook.h"
 #include "services/session/supervisor/session_record.h"
 #include "services/session/supervisor/svg_plot.h"
+#include "services/session/supervisor/video.h"
 #include "tests/unit/supervisor/temporary_folder.h"
 
 namespace fulcrum::supervisor {
@@ -258,47 +258,52 @@ TEST(PictureTest, EmbedsAndShrinks) {
   EXPECT_TRUE(EmbedPng(folder.path() / "bad.png", 1).empty());
 }
 
-/// A substitute for `ffmpeg`, alone in PATH.
-class ClipTest : public ::testing::Test {
+class VideoTest : public ::testing::Test {
  protected:
-  ClipTest() : path_(std::getenv("PATH")) { setenv("PATH", folder_.path().c_str(), 1); }
-  ~ClipTest() override { setenv("PATH", path_.c_str(), 1); }
-  void Ffmpeg(const std::string& body) {
-    const fs::path program = folder_.path() / "ffmpeg";
-    std::ofstream(program) << "#!/bin/sh\nfor last; do :; done\n" << body << '\n';
-    fs::permissions(program, fs::perms::owner_all);
+  /// A substitute for `replayer`.
+  void Replayer(const std::string& body) {
+    std::ofstream(order_.replayer) << "#!/bin/sh\n" << body << '\n';
+    fs::permissions(order_.replayer, fs::perms::owner_all);
   }
-  [[nodiscard]] bool Make() const { return MakeClip(folder_.path(), clip_, folder_.path() / "clip.log"); }
+  [[nodiscard]] SessionVideo Make(bool goes_on = true) const {
+    return MakeVideo(order_, [goes_on] { return goes_on; });
+  }
 
   const TemporaryFolder folder_;
-  const fs::path clip_ = folder_.path() / "clip.mp4";
-  const std::string path_;
+  const VideoOrder order_{.replayer = folder_.path() / "replayer",
+                          .recording = folder_.path() / "recording.mcap",
+                          .scene = folder_.path() / "scene.fulcrum",
+                          .video = folder_.path() / "video.mp4",
+                          .log = folder_.path() / "video.log"};
 };
 
-TEST_F(ClipTest, ShowsEachPictureForItsTime) {
-  for (const char* name : {"frame_0000500.png", "frame_0000750.png", "frame_0002000.png"}) {
-    std::ofstream(folder_.path() / name) << "x";
-  }
-  Ffmpeg("while read -r line; do echo \"$line\"; done < \"$last.frames\" > \"$last\"");
-  ASSERT_TRUE(Make());
-  std::ifstream in(clip_);
-  const std::string list{std::istreambuf_iterator<char>(in), {}};
-  EXPECT_NE(list.find("frame_0000500.png'\nduration 0.25\n"), std::string::npos) << list;
-  EXPECT_NE(list.find("frame_0000750.png'\nduration 1.25\n"), std::string::npos) << list;
-  EXPECT_FALSE(fs::exists(clip_.string() + ".frames"));
+TEST_F(VideoTest, HasItsChapters) {
+  Replayer(
+      R"(echo "$@"; echo '{"chapters": [{"begin_s": 0, "title": "start"}, {"begin_s": 72.5, "title": "cut at 35 W"}]}' > )" +
+      (folder_.path() / "video.json").string());
+  const SessionVideo video = Make();
+  EXPECT_EQ(video.file, order_.video);
+  EXPECT_EQ(video.missing, "");
+  EXPECT_EQ(video.chapters, (std::vector<std::string>{"0:00 start", "1:12 cut at 35 W"}));
+  EXPECT_EQ(video.subtitles, "WEBVTT\n\n00:01:12.500 --> 00:01:15.500\ncut at 35 W\n");
+  std::ifstream in(order_.log);
+  std::string words;
+  std::getline(in, words);
+  EXPECT_TRUE(words.starts_with(order_.recording.string() + " --video " + order_.video.string())) << words;
 }
 
-TEST_F(ClipTest, WithoutPicturesOrProgramOrAfterAFailureThereIsNone) {
-  Ffmpeg("echo clip > \"$last\"");
-  EXPECT_FALSE(Make()) << "no pictures";
-  std::ofstream(folder_.path() / "frame_0000500.png") << "x";
-  std::ofstream(folder_.path() / "frame_0000750.png") << "x";
-  EXPECT_TRUE(Make());
-  Ffmpeg("echo half > \"$last\"; exit 1");
-  EXPECT_FALSE(Make());
-  EXPECT_FALSE(fs::exists(clip_));
-  fs::remove(folder_.path() / "ffmpeg");
-  EXPECT_FALSE(Make());
+TEST_F(VideoTest, SaysWhyThereIsNone) {
+  EXPECT_NE(Make().missing.find("cannot start"), std::string::npos);
+  Replayer("echo 'replayer: ffmpeg is not installed'; exit 2");
+  EXPECT_EQ(Make().missing, "ffmpeg is not installed");
+  EXPECT_TRUE(Make().file.empty());
+  fs::remove(order_.log);
+  Replayer("kill -9 $$");
+  EXPECT_NE(Make().missing.find("killed by signal 9"), std::string::npos);
+  Replayer("sleep 60");
+  EXPECT_NE(Make(false).missing.find("left out"), std::string::npos);
+  Replayer("echo nonsense: [ > " + (folder_.path() / "video.json").string());
+  EXPECT_EQ(Make().file, order_.video) << "a video without its chapters";
 }
 
 TEST(ReportTest, HoldsEverythingAndNothingFromElsewhere) {
@@ -319,11 +324,13 @@ TEST(ReportTest, HoldsEverythingAndNothingFromElsewhere) {
   ThermalEvent event;
   event.kind = ThermalEventKind::kCut;
   record.AddEvent(event);
-  std::ofstream(folder.path() / "clip.mp4") << "a clip";
-  const std::string html = ReportHtml(outcome, record, folder.path(), folder.path() / "clip.mp4");
+  std::ofstream(folder.path() / "video.mp4") << "a clip";
+  outcome.recording = folder.path() / "recording.mcap";
+  outcome.video = {.file = folder.path() / "video.mp4", .chapters = {"0:03 cut at 35 W"}, .subtitles = "WEBVTT\n"};
+  const std::string html = ReportHtml(outcome, record, folder.path());
   for (const char* part : {"&lt;tiny&gt;", "physics_node", "data:image/png;base64,", "data:video/mp4;base64,YSBjbGlw",
                            "<svg", "class='mark'", "killed by signal 9", "cut × 1", "✗ a fault &amp; its cause",
-                           "<td>3.5 s</td>", "a: &lt;b&gt;"}) {
+                           "<td>3.5 s</td>", "a: &lt;b&gt;", "0:03 cut at 35 W", "data:text/vtt;base64,"}) {
     EXPECT_NE(html.find(part), std::string::npos) << part;
   }
   for (const char* outside : {"http://", "https://", "src='/", "<script", "<link"}) {

@@ -10,8 +10,8 @@
 #include <thread>
 
 #include "services/base/core/error.h"
+#include "services/base/runtime/child_process.h"
 #include "services/session/supervisor/attached_node.h"
-#include "services/session/supervisor/child_process.h"
 #include "services/session/supervisor/restart_policy.h"
 #include "tests/unit/supervisor/temporary_folder.h"
 
@@ -36,7 +36,9 @@ class AttachedNodeTest : public ::testing::Test {
     command.arguments = {"--scene", "/run/scene.fulcrum"};
     return command;
   }
-  ChildProcess Sleeper() const { return ChildProcess::Start("/bin/sleep", {"600"}, folder_.path() / "log"); }
+  runtime::ChildProcess Sleeper() const {
+    return runtime::ChildProcess::Start("/bin/sleep", {"600"}, folder_.path() / "log");
+  }
   bool Report(pid_t pid, HealthState state = HealthState::kRunning) {
     Health health;
     health.node = NodeId::kPhysics;
@@ -44,7 +46,7 @@ class AttachedNodeTest : public ::testing::Test {
     health.state = state;
     return node_.OnHealth(health, kStart);
   }
-  static void Kill(ChildProcess* process) {
+  static void Kill(runtime::ChildProcess* process) {
     process->Signal(SIGKILL);
     while (!process->Poll()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
@@ -68,7 +70,7 @@ TEST_F(AttachedNodeTest, WritesWhatItsServiceIsGiven) {
 }
 
 TEST_F(AttachedNodeTest, NoticesADeathAndTheReturn) {
-  ChildProcess first = Sleeper(), other = Sleeper();
+  runtime::ChildProcess first = Sleeper(), other = Sleeper();
   EXPECT_TRUE(Report(first.pid()));
   EXPECT_FALSE(Report(other.pid())) << "the first process runs";
   EXPECT_FALSE(node_.Update(kStart).has_value());
@@ -88,7 +90,7 @@ TEST_F(AttachedNodeTest, NoticesADeathAndTheReturn) {
 }
 
 TEST_F(AttachedNodeTest, DoesNotWaitForLastWordsWhenTheNextOneSpeaks) {
-  ChildProcess first = Sleeper(), second = Sleeper();
+  runtime::ChildProcess first = Sleeper(), second = Sleeper();
   ASSERT_TRUE(Report(first.pid()));
   Kill(&first);
   EXPECT_FALSE(node_.Update(kStart).has_value());
@@ -98,7 +100,7 @@ TEST_F(AttachedNodeTest, DoesNotWaitForLastWordsWhenTheNextOneSpeaks) {
 }
 
 TEST_F(AttachedNodeTest, LastWordsMayComeAfterTheEnd) {
-  ChildProcess first = Sleeper();
+  runtime::ChildProcess first = Sleeper();
   ASSERT_TRUE(Report(first.pid()));
   const pid_t dead = first.pid();
   Kill(&first);
@@ -108,7 +110,7 @@ TEST_F(AttachedNodeTest, LastWordsMayComeAfterTheEnd) {
 }
 
 TEST_F(AttachedNodeTest, OneThatWasStoppedIsReportedWhenItIsBack) {
-  ChildProcess first = Sleeper(), second = Sleeper();
+  runtime::ChildProcess first = Sleeper(), second = Sleeper();
   node_.AskRestart(kStart);
   EXPECT_EQ(order_, "restart");
   ASSERT_TRUE(Report(first.pid()));
@@ -158,7 +160,7 @@ TEST(RestartPolicyTest, LongLifeStartsTheCountAnew) {
 
 // ------------------------------------------------------------------------------------------------ child process
 
-ProcessEnd WaitFor(ChildProcess* child) {
+runtime::ProcessEnd WaitFor(runtime::ChildProcess* child) {
   for (;;) {
     if (const auto end = child->Poll()) return *end;
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -167,8 +169,9 @@ ProcessEnd WaitFor(ChildProcess* child) {
 
 TEST(ChildProcessTest, ReportsExitCodeAndKeepsTheOutput) {
   const TemporaryFolder folder;
-  ChildProcess child = ChildProcess::Start("/bin/sh", {"-c", "echo out; echo err >&2; exit 3"}, folder.path() / "log");
-  const ProcessEnd end = WaitFor(&child);
+  runtime::ChildProcess child =
+      runtime::ChildProcess::Start("/bin/sh", {"-c", "echo out; echo err >&2; exit 3"}, folder.path() / "log");
+  const runtime::ProcessEnd end = WaitFor(&child);
   EXPECT_EQ(end.exit_code, 3);
   EXPECT_EQ(end.Describe(), "ended with exit code 3 (scene or schema mismatch)");
   EXPECT_FALSE(child.running());
@@ -180,7 +183,7 @@ TEST(ChildProcessTest, ReportsExitCodeAndKeepsTheOutput) {
 
 TEST(ChildProcessTest, ReportsTheSignal) {
   const TemporaryFolder folder;
-  ChildProcess child = ChildProcess::Start("/bin/sleep", {"100"}, folder.path() / "log");
+  runtime::ChildProcess child = runtime::ChildProcess::Start("/bin/sleep", {"100"}, folder.path() / "log");
   EXPECT_FALSE(child.Poll().has_value());
   child.Signal(SIGKILL);
   EXPECT_EQ(WaitFor(&child).Describe(), "killed by signal 9 (Killed)");
@@ -189,7 +192,7 @@ TEST(ChildProcessTest, ReportsTheSignal) {
 TEST(ChildProcessTest, MissingProgramIsRefusedByName) {
   const TemporaryFolder folder;
   try {
-    (void)ChildProcess::Start(folder.path() / "nothing", {}, folder.path() / "log");
+    (void)runtime::ChildProcess::Start(folder.path() / "nothing", {}, folder.path() / "log");
     FAIL() << "a missing program was started";
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("nothing: No such file"), std::string::npos) << error.what();
@@ -200,7 +203,7 @@ TEST(ChildProcessTest, DestructionLeavesNoProcess) {
   const TemporaryFolder folder;
   pid_t pid = 0;
   {
-    const ChildProcess child = ChildProcess::Start("/bin/sleep", {"100"}, folder.path() / "log");
+    const runtime::ChildProcess child = runtime::ChildProcess::Start("/bin/sleep", {"100"}, folder.path() / "log");
     pid = child.pid();
     EXPECT_EQ(::kill(pid, 0), 0);
   }

@@ -10,7 +10,7 @@
 
 #include "services/base/core/error.h"
 
-namespace fulcrum::supervisor {
+namespace fulcrum::runtime {
 
 /// The system has no descriptor, process or memory left for a program. The same start may succeed later.
 class ShortageError : public InputError {
@@ -65,4 +65,7 @@ class ChildProcess {
   WithParent with_parent_ = WithParent::kDies;
 };
 
-}  // namespace fulcrum::supervisor
+/// The program of that name in the folders of PATH; empty: there is none.
+[[nodiscard]] std::filesystem::path FindInPath(const std::string& name);
+
+}  // namespace fulcrum::runtime

@@ -1,23 +1,24 @@
-#include "services/session/supervisor/child_process.h"
+#include "services/base/runtime/child_process.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <stdlib.h>
 #include <unistd.h>
 
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <optional>
 #include <string>
 #include <thread>
 
-#include "tests/unit/supervisor/temporary_folder.h"
-
-namespace fulcrum::supervisor {
+namespace fulcrum::runtime {
 namespace {
 
 TEST(ChildProcess, InheritsNoOpenFileOfItsParent) {
-  const TemporaryFolder folder;
-  const std::filesystem::path log = folder.path() / "log", secret = folder.path() / "open-in-the-parent";
+  std::string folder = (std::filesystem::temp_directory_path() / "fulcrum_child_process_XXXXXX").string();
+  ASSERT_NE(::mkdtemp(folder.data()), nullptr);
+  const std::filesystem::path log = folder + "/log", secret = folder + "/open-in-the-parent";
   // Opened like the sockets of the bus: without O_CLOEXEC.
   const int fd = ::open(secret.c_str(), O_RDWR | O_CREAT, 0600);
   ASSERT_GE(fd, 0);
@@ -28,9 +29,10 @@ TEST(ChildProcess, InheritsNoOpenFileOfItsParent) {
   EXPECT_EQ(end->exit_code, 0);
   std::ifstream stream(log);
   const std::string listed{std::istreambuf_iterator<char>(stream), {}};
+  std::filesystem::remove_all(folder);
   EXPECT_NE(listed.find(log.filename().string()), std::string::npos) << listed;
   EXPECT_EQ(listed.find(secret.filename().string()), std::string::npos) << listed;
 }
 
 }  // namespace
-}  // namespace fulcrum::supervisor
+}  // namespace fulcrum::runtime

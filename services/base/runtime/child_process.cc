@@ -1,4 +1,4 @@
-#include "services/session/supervisor/child_process.h"
+#include "services/base/runtime/child_process.h"
 
 #include <fcntl.h>
 #include <linux/close_range.h>
@@ -8,12 +8,14 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
+#include <sstream>
 #include <utility>
 
 #include "services/base/core/exit_code.h"
 
-namespace fulcrum::supervisor {
+namespace fulcrum::runtime {
 namespace {
 
 const char* Meaning(int exit_code) {
@@ -43,14 +45,14 @@ const char* Meaning(int exit_code) {
 void Become(const char* program, char* const* arguments, const ChildStreams& streams, WithParent with_parent,
             pid_t parent) {
   if (with_parent == WithParent::kDies) {
-    // SIGKILL, because a hanging node must not outlive the supervisor either; checkpoints make the kill harmless.
+    // SIGKILL, because a hanging node must not outlive its supervisor either; checkpoints make the kill harmless.
     if (::prctl(PR_SET_PDEATHSIG, SIGKILL) != 0) return;
     if (::getppid() != parent) ::_exit(1);  // The parent died before prctl took effect.
   }
   sigset_t none;
   sigemptyset(&none);
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
-  // With a process group per child, Ctrl-C on the terminal reaches the supervisor alone, which then stops its children
+  // With a process group per child, Ctrl-C on the terminal reaches the parent alone, which then stops its children
   // in good order.
   if (::setpgid(0, 0) != 0) return;
   const int input = streams.input >= 0 ? streams.input : ::open("/dev/null", O_RDONLY | O_CLOEXEC);
@@ -159,4 +161,16 @@ void ChildProcess::Signal(int signal) const {
   }
 }
 
-}  // namespace fulcrum::supervisor
+std::filesystem::path FindInPath(const std::string& name) {
+  const char* folders = std::getenv("PATH");
+  std::istringstream list(folders != nullptr ? folders : "");
+  for (std::string folder; std::getline(list, folder, ':');) {
+    std::filesystem::path program = std::filesystem::path(folder) / name;
+    if (!folder.empty() && ::access(program.c_str(), X_OK) == 0 && !std::filesystem::is_directory(program)) {
+      return program;
+    }
+  }
+  return {};
+}
+
+}  // namespace fulcrum::runtime

@@ -1,0 +1,69 @@
+#include "services/apps/replayer/projector.h"
+
+#include <algorithm>
+#include <cstdint>
+
+#include "services/apps/replayer/session_facts.h"
+#include "services/records/recording/mcap_reader.h"
+
+namespace fulcrum::replay {
+namespace {
+
+/// Longest time between two steps of the renderer: its effects follow the instruments, and its inputs keep few samples.
+constexpr double kStep_s = 1.0 / 30;
+
+double EndOf(const std::filesystem::path& recording, std::int64_t start_ns) {
+  recording::McapReader reader(recording, recording::McapReader::Depth::kChunkHeads);
+  for (recording::McapMessage none{}; reader.Next(&none);) {
+  }
+  return 1e-9 * static_cast<double>(static_cast<std::int64_t>(reader.last_ns()) - ClockOffset(reader) - start_ns);
+}
+
+}  // namespace
+
+Projector::Projector(const std::filesystem::path& recording, const SceneView& scene)
+    : recording_(recording), scene_(scene) {
+  Begin();
+  if (Read()) end_s_ = std::max(0.0, EndOf(recording_, replay_->session_start_ns()));
+}
+
+void Projector::Begin() {
+  replay_.reset();  // Two contexts of OpenGL at a time need twice the memory.
+  render::RenderSettings settings;
+  settings.quality = render::Quality::kHigh;  // A picture that stands still is looked at.
+  replay_.emplace(recording_, scene_, settings);
+  at_s_ = read_s_ = 0;
+}
+
+bool Projector::Read() {
+  const std::optional<double> next_s = replay_->Next();
+  read_s_ = next_s.value_or(read_s_);
+  if (next_s && follow_) follow_(*replay_, read_s_);
+  return next_s.has_value();
+}
+
+void Projector::GoTo(double time_s) {
+  time_s = std::clamp(time_s, 0.0, end_s_);
+  if (time_s < at_s_) Begin();
+  double due_s = at_s_ + kStep_s;
+  while (read_s_ < time_s && Read()) {
+    if (read_s_ < due_s || read_s_ >= time_s) continue;
+    replay_->Step(read_s_);
+    replay_->node().FollowEffects();
+    due_s = read_s_ + kStep_s;
+  }
+  at_s_ = time_s;
+  replay_->Step(time_s);
+}
+
+bool Projector::Draw(render::Bitmap* picture) {
+  render::RenderNode& node = replay_->node();
+  bool drawn = node.DrawInto(picture);
+  while (!drawn && node.pictures_drawn() == 0 && Read()) {
+    replay_->Step(std::max(at_s_, read_s_));
+    drawn = node.DrawInto(picture);
+  }
+  return drawn;
+}
+
+}  // namespace fulcrum::replay
