@@ -11,6 +11,7 @@
 
 #include "render_node/geometry/laparoscope.h"
 #include "render_node/node/camera_keys.h"
+#include "render_node/node/hands_view.h"
 #include "services/base/core/contact_force.h"
 #include "services/base/core/generator_inputs.h"
 #include "services/base/runtime/cyclic_thread.h"
@@ -113,6 +114,16 @@ bool RenderNode::DrawInto(Bitmap* picture) {
   Draw(session_time_s_, false, ReadBack::kAlways);
   *picture = picture_;
   return true;
+}
+
+void RenderNode::DrawFrom(const RenderParams& camera, Bitmap* picture) {
+  (void)view_.UpdateEffects(session_time_s_);
+  view_.SetCamera(camera);
+  view_.SetScale(quality_.scale());
+  view_.SetTexts({});
+  view_.Update();
+  display_.DrawAndRead(picture);
+  view_.SetCamera(camera_.params());
 }
 
 void RenderNode::Finish() {
@@ -289,24 +300,7 @@ void RenderNode::TakeSize() {
   changed_on_screen_ = true;
 }
 
-HandsView RenderNode::ViewNow() const {
-  const RenderParams& camera = camera_.params();
-  const Eigen::Matrix4f view = MakeLaparoscope(camera).view;
-  constexpr float kRadPerDeg = 0.0174532925f;
-  HandsView hands;
-  hands.eye = camera.scope_tip_W;
-  hands.right = view.row(0).head<3>().transpose();
-  hands.up = view.row(1).head<3>().transpose();
-  hands.forward = -view.row(2).head<3>().transpose();
-  hands.pixel = 2.0f * std::tan(0.5f * kRadPerDeg * camera.fov_deg) / static_cast<float>(shape_.height);
-  for (std::size_t i = 0; i < kMaxTools; ++i) {
-    hands.present[i] = tools_.tools[i].kind != ToolKind::kNone && !scene_.tools[i].assists();
-    hands.scope[i] = tools_.tools[i].kind == ToolKind::kScope;
-    hands.tip[i] = tools_.tools[i].p_WT;
-    hands.force_N[i] = tools_.tools[i].f_W.norm();
-  }
-  return hands;
-}
+HandsView RenderNode::ViewNow() const { return MakeHandsView(scene_, camera_.params(), shape_.height, tools_); }
 
 PictureHeader RenderNode::HeaderNow() {
   const HandsView view = ViewNow();

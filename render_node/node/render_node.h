@@ -66,6 +66,17 @@ class RenderNode {
   /// since the last picture or no tissue has come yet. Call from the thread of Step, after it.
   [[nodiscard]] bool DrawInto(Bitmap* picture);
 
+  /// Draws the present state as another camera sees it, without text. Call from the thread of Step, after it.
+  void DrawFrom(const RenderParams& camera, Bitmap* picture);
+
+  /// What the next picture shows.
+  [[nodiscard]] LaparoscopeView& view() { return view_; }
+  [[nodiscard]] const RenderParams& camera() const { return camera_.params(); }
+  [[nodiscard]] const ToolState& tools() const { return tools_; }
+  [[nodiscard]] const HandleState& handles() const { return handles_; }
+  /// Force of the tissue on each tool [N].
+  [[nodiscard]] const std::array<float, kMaxTools>& forces() const { return force_N_; }
+
   /// Time between two steps. In a window the scene sets the wanted rate of pictures, the cart (`cart_ns`) the rate that
   /// the machine can reach, and the lower one is used. An operator's hand and readers of live pictures wait for theirs:
   /// then, and off screen, the cart's is used [ns].

@@ -20,13 +20,21 @@ osg::ref_ptr<osg::Geometry> ToGeometry(const Solid& solid, const char* name) {
   return mesh.geometry();
 }
 
+constexpr const char* kToolName = "tool ";
+
 }  // namespace
+
+int ToolNamed(const std::string& name) {
+  const std::size_t digit = std::string(kToolName).size();
+  return name.starts_with(kToolName) && name.size() > digit ? name[digit] - '0' : -1;
+}
 
 Instruments::Instruments(const SceneView& scene) : root_(new osg::Group) {
   root_->getOrCreateStateSet()->setAttributeAndModes(MakeProgram("surface.vert", "instrument.frag"));
   for (std::uint32_t k = 0; k < kMaxTools; ++k) {
     Instrument& instrument = instruments_[k];
     instrument.body = new osg::MatrixTransform;
+    instrument.body->setName(kToolName + std::to_string(k));
     instrument.body->setNodeMask(0);
     instrument.hinge_m = scene.tools[k].tip_length_m;
     root_->addChild(instrument.body);

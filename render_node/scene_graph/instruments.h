@@ -5,10 +5,14 @@
 #include <array>
 #include <osg/Group>
 #include <osg/MatrixTransform>
+#include <string>
 
 #include "services/base/core/scene_view.h"
 
 namespace fulcrum::render {
+
+/// Tool of a node of this name in the graph of the instruments; -1: none.
+[[nodiscard]] int ToolNamed(const std::string& name);
 
 class Instruments {
  public:

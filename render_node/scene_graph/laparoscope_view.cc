@@ -258,6 +258,8 @@ void LaparoscopeView::SetCamera(const RenderParams& params) {
   impl_->ShineFrom(impl_->scope);
 }
 
+void LaparoscopeView::SetDetail(float factor) { impl_->layers.SetDetail(factor); }
+
 void LaparoscopeView::SetSoil(float soil) { impl_->optics.SetSoil(soil); }
 
 void LaparoscopeView::SetScale(float scale) { impl_->optics.SetScale(scale); }
@@ -296,6 +298,7 @@ bool LaparoscopeView::UpdateEffects(double session_time_s) {
   return changed || impl_->bleeding.sources() > 0 || impl_->bleeding.drops() > 0;
 }
 
+const Atlas& LaparoscopeView::atlas() const { return impl_->atlas; }
 osg::Group* LaparoscopeView::root() const { return impl_->root; }
 const Laparoscope& LaparoscopeView::laparoscope() const { return impl_->scope; }
 

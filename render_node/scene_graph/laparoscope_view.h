@@ -5,6 +5,7 @@
 #include <osg/Group>
 #include <span>
 
+#include "render_node/geometry/atlas.h"
 #include "render_node/geometry/laparoscope.h"
 #include "render_node/scene_graph/overlay.h"
 #include "services/base/core/scene_view.h"
@@ -43,6 +44,9 @@ class LaparoscopeView {
   void SetSize(int width, int height);
   /// Sets the camera's position, target, roll and field of view from `params`; the size does not change.
   void SetCamera(const RenderParams& params);
+  /// Draws the membrane in so many triangles as a picture with `factor` times as many lines needs; 1 at first. What is
+  /// coarser shifts a place of the tissue by up to half a pixel from one picture to the next.
+  void SetDetail(float factor);
   /// 0: clear lens … 1: nothing to be seen.
   void SetSoil(float soil);
   /// Resolution of the scene as a share of the picture's width and height, in (0, most]; text is always drawn at full
@@ -55,6 +59,8 @@ class LaparoscopeView {
   /// Without a change the next picture reuses the last one of the scene.
   void Update();
 
+  /// The sheet's thermal state as drawn.
+  [[nodiscard]] const Atlas& atlas() const;
   [[nodiscard]] osg::Group* root() const;
   [[nodiscard]] const Laparoscope& laparoscope() const;
   /// Present position, frame W, of the sheet's node nearest to (s, t) [m].

@@ -136,6 +136,11 @@ void TissueLayers::SetScope(const Laparoscope& scope) {
   scope_changed_ = true;
 }
 
+void TissueLayers::SetDetail(float factor) {
+  detail_factor_ = factor;
+  scope_changed_ = true;
+}
+
 void TissueLayers::ShowFat(const std::function<bool(const Vec2f& material, float thickness)>& visible,
                            const std::function<bool(const Vec2f& material)>& opened) {
   fat_.FindBared(opened, membrane_, &fat_bared_);
@@ -189,7 +194,7 @@ void TissueLayers::UpdateMembrane() {
     }
     sheet_.mesh->SetCoordinates(coordinates);
   }
-  detail_.Choose(membrane_, eye_W_, pixels_per_rad_, &chosen_);
+  detail_.Choose(membrane_, eye_W_, detail_factor_ * pixels_per_rad_, &chosen_);
   Show(&sheet_, positions, chosen_, Sides::kBoth);
 }
 

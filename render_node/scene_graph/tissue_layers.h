@@ -27,6 +27,8 @@ class TissueLayers {
   /// Returns false, and changes nothing, if the topology belongs to another grid.
   bool SetTopology(const TopologyState& topology);
   void SetScope(const Laparoscope& scope);
+  /// Draws the membrane in so many triangles as a picture with `factor` times as many lines needs; 1 at first.
+  void SetDetail(float factor);
   /// Draws a triangle of the fat if one of its corners is `visible`, as a function of (s, t) [m] and thickness 0 … 1,
   /// or is bared because the sheet above is `opened`.
   void ShowFat(const std::function<bool(const Vec2f& material, float thickness)>& visible,
@@ -58,6 +60,7 @@ class TissueLayers {
   FieldOfView field_;
   Vec3f eye_W_;
   float pixels_per_rad_;
+  float detail_factor_ = 1;
   MembraneMesh membrane_;
   SheetDetail detail_;
   FatLayer fat_;

@@ -16,6 +16,7 @@ constexpr const char* kUsage =
        replayer RECORDING --live [--only NODE... | --except NODE...] [options]
        replayer RECORDING --film
        replayer RECORDING --video FILE [options]
+       replayer RECORDING --dataset DIR [options]
        replayer RECORDING --test NODE [--expect HASH] [--assert EXPR...] [options]
 
 Replays a recorded session: nodes compute its ticks again from exactly the recorded inputs, and after each tick their
@@ -45,6 +46,12 @@ for each use of the generator and each warning. Needs the program ffmpeg. fulcru
 
   replayer out/latest/recording.mcap --video video.mp4
 
+With --dataset the session becomes a data set for machine learning: pictures of a left and a right camera with depth,
+normals, optical flow, classes, instances, temperature, damage and water of each pixel, COCO annotations, calibration,
+and poses, forces and keypoints of the instruments. The manual's page dataset.md describes the files.
+
+  replayer out/latest/recording.mcap --dataset dataset --every 0.2
+
 With --test one node computes all ticks of the session, also after states that differ, and its figures are checked
 against --expect and --assert; --junit writes the result for a CI system. Without --expect and --assert each state must
 equal the recorded one. fulcrum test-node does the same.
@@ -65,7 +72,12 @@ void AddOptions(po::options_description* options) {
       ("video", po::value<std::string>()->value_name("FILE"), "write the session as a video")  //
       ("within", po::value<double>()->value_name("S")->default_value(0),
        "video: be ready after this time [s], with fewer different pictures a second if need be, at least one; 0: as "
-       "long as it takes")  //
+       "long as it takes")                                                                               //
+      ("dataset", po::value<std::string>()->value_name("DIR"), "write a data set into this new folder")  //
+      ("every", po::value<double>()->value_name("S")->default_value(0.2, "0.2"),
+       "dataset: session time between two pictures, 0.01 to 3600 [s]")  //
+      ("baseline", po::value<double>()->value_name("MM")->default_value(5),
+       "dataset: distance of the right camera from the left one, 0 (no right pictures) to 100 [mm]")  //
       ("test", po::value<std::vector<std::string>>()->value_name("NODE"),
        "node to test: physics, thermal, haptics or render")  //
       ("expect", po::value<std::string>()->value_name("HASH"),

@@ -21,6 +21,7 @@ int Run(int argc, char** argv) {
   if (options.live) return replay::RunLive(options.live_settings);
   if (options.film) return replay::RunFilm(options);
   if (!options.video.empty()) return replay::RunVideo(options);
+  if (!options.dataset.empty()) return replay::RunDataset(options);
   if (options.test) return replay::RunTest(options);
   return replay::RunReplay(options);
 }

@@ -51,9 +51,10 @@ std::filesystem::path RecordingOf(const CommandLine& line) {
 
 void CheckKind(const CommandLine& line) {
   int kinds = 0;
-  for (const char* kind : {"into", "live", "film", "video", "test"}) kinds += line.Has(kind) ? 1 : 0;
+  for (const char* kind : {"into", "live", "film", "video", "dataset", "test"}) kinds += line.Has(kind) ? 1 : 0;
   if (kinds != 1)
-    throw InputError("give one of --into NODE..., --live, --film, --video FILE and --test NODE; see --help");
+    throw InputError(
+        "give one of --into NODE..., --live, --film, --video FILE, --dataset DIR and --test NODE; see --help");
 }
 
 LiveSettings LiveSettingsFrom(const CommandLine& line) {
@@ -121,6 +122,19 @@ void ReadVideo(const CommandLine& line, Options* options) {
   if (!(options->video_within_s >= 0)) throw InputError("--within: must be 0 (as long as it takes) or more seconds");
 }
 
+void ReadDataset(const CommandLine& line, Options* options) {
+  options->dataset = line.TextOf("dataset");
+  if (options->dataset.empty()) throw InputError("--dataset: needs the name of a new folder, for example dataset");
+  options->dataset_every_s = line.ValueOf<double>("every");
+  if (!(options->dataset_every_s >= 0.01 && options->dataset_every_s <= 3600)) {
+    throw InputError("--every: must be 0.01 to 3600 seconds");
+  }
+  options->dataset_baseline_m = 1e-3 * line.ValueOf<double>("baseline");
+  if (!(options->dataset_baseline_m >= 0 && options->dataset_baseline_m <= 0.1)) {
+    throw InputError("--baseline: must be 0 (no right pictures) to 100 mm");
+  }
+}
+
 void ReadFiles(const CommandLine& line, Options* options) {
   const std::filesystem::path& recording = options->lock_step.recording;
   options->scene = recording::BesideRecording(line.TextOf("scene"), recording, "scene.fulcrum");
@@ -159,8 +173,9 @@ Options ParseOptions(int argc, char** argv) {
     return options;
   }
   options.quiet = line.Has("quiet") || ::isatty(STDERR_FILENO) == 0;
-  if (line.Has("video")) {
-    ReadVideo(line, &options);
+  if (line.Has("video") || line.Has("dataset")) {
+    if (line.Has("video")) ReadVideo(line, &options);
+    if (line.Has("dataset")) ReadDataset(line, &options);
     ReadPace(line, &options.lock_step);
     ReadFiles(line, &options);
     return options;

@@ -4,10 +4,12 @@
 
 #include "services/apps/replayer/changed_scene.h"
 #include "services/apps/replayer/console.h"
+#include "services/apps/replayer/dataset.h"
 #include "services/apps/replayer/film.h"
 #include "services/apps/replayer/lock_step_report.h"
 #include "services/apps/replayer/pictures.h"
 #include "services/apps/replayer/progress_line.h"
+#include "services/apps/replayer/report_format.h"
 #include "services/apps/replayer/scratch_folder.h"
 #include "services/apps/replayer/video.h"
 #include "services/apps/replayer/what_if.h"
@@ -79,6 +81,22 @@ int RunVideo(const Options& options) {
   progress.Clear();
   std::cout << options.video.string() << ": " << result.pictures << " pictures, " << result.duration_s << " s\n";
   if (!options.json.empty()) WriteVideoJson(result, options.json);
+  return static_cast<int>(ExitCode::kDone);
+}
+
+int RunDataset(const Options& options) {
+  const scene::SceneFile scene(options.scene);
+  const ProgressLine progress(options.quiet);
+  const DatasetSettings settings{options.lock_step.recording, options.dataset, options.lock_step.until_s,
+                                 options.dataset_every_s, options.dataset_baseline_m};
+  const DatasetResult result = MakeDataset(settings, scene.view(), progress.callback());
+  progress.Clear();
+  std::cout << options.dataset.string() << ": " << result.frames << " frames, " << result.duration_s << " s; look at "
+            << (options.dataset / "sheet.png").string() << '\n';
+  if (!options.json.empty()) {
+    WriteText(options.json, Format("{\n  \"frames\": %llu,\n  \"duration_s\": %.3f\n}\n",
+                                   static_cast<unsigned long long>(result.frames), result.duration_s));
+  }
   return static_cast<int>(ExitCode::kDone);
 }
 

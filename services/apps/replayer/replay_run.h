@@ -16,4 +16,8 @@ int RunFilm(const Options& options);
 /// the same.
 int RunVideo(const Options& options);
 
+/// replayer --dataset; see MakeDataset(). Prints the result and writes it to `options.json`. Returns the exit code;
+/// throws the same.
+int RunDataset(const Options& options);
+
 }  // namespace fulcrum::replay

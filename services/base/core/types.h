@@ -10,6 +10,7 @@ namespace fulcrum {
 
 using Vec2f = Eigen::Vector2f;
 using Vec3f = Eigen::Vector3f;
+using Vec2d = Eigen::Vector2d;
 using Vec3d = Eigen::Vector3d;
 using Mat3f = Eigen::Matrix3f;
 using Mat3d = Eigen::Matrix3d;

@@ -1,13 +1,12 @@
 // Sets of pixels: distances and connected pieces.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 
-namespace fulcrum::log_tools {
+#include "services/base/core/types.h"
 
-using Vec2d = Eigen::Vector2d;
+namespace fulcrum::log_tools {
 
 /// Pixels row by row; everything outside is clear.
 struct Mask {

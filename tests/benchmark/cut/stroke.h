@@ -11,8 +11,6 @@
 
 namespace fulcrum::benchmark {
 
-using Vec2d = Eigen::Vector2d;
-
 enum class Shape { kAlong, kAcross, k30deg, k45deg, kCircle, kSpiral, kEight, kZigzag, kStay };
 [[nodiscard]] const char* NameOf(Shape shape);
 

@@ -3,6 +3,7 @@
 //   replay.hash_mismatches    states that differ, of physics, thermal and haptics over the whole recording
 //   replay.states_compared
 //   video.fps_p50, video.s_per_session_s   of the session as a video
+//   dataset.frames_per_s      all channels of a left camera, pictures of a right one
 //   replay.speed_x_realtime   physics and thermal together, physics on as many threads as there are cores
 #include <chrono>
 #include <cstdio>
@@ -36,6 +37,16 @@ bool MakeVideo(const std::filesystem::path& recording, benchmark::Report* report
   return true;
 }
 
+bool MakeDataset(const std::filesystem::path& recording, benchmark::Report* report) {
+  const auto begin = std::chrono::steady_clock::now();
+  const auto run =
+      testing::Replay(recording, {"--dataset", recording.parent_path() / "dataset", "--every", "0.05"}, 600);
+  const std::chrono::duration<double> used = std::chrono::steady_clock::now() - begin;
+  if (run.exit_code != 0) return Fail("there is no data set", run.said) == 0;
+  report->Add("dataset.frames_per_s", run.figures.at("frames") / used.count(), "1/s");
+  return true;
+}
+
 int Run(benchmark::Report* report) {
   testing::Cart cart(report->quick() ? "small" : "built-in", kDomain, {"--record"});
   if (cart.WaitForEnd(kPatience_s) != 0) return Fail("the session did not end well", cart.Said());
@@ -59,7 +70,9 @@ int Run(benchmark::Report* report) {
     speeds.push_back(run.figures.at("speed_x_realtime"));
   }
   report->Add("replay.speed_x_realtime", benchmark::Quantile(speeds, 0.5), "1");
-  return MakeVideo(recording, report) && all.exit_code == 0 ? 0 : 1;
+  if (report->Wants("video.") && !MakeVideo(recording, report)) return 1;
+  if (report->Wants("dataset.") && !MakeDataset(recording, report)) return 1;
+  return all.exit_code;
 }
 
 }  // namespace
@@ -67,5 +80,5 @@ int Run(benchmark::Report* report) {
 
 int main(int argc, char** argv) {
   fulcrum::benchmark::Report report(argc, argv);
-  return report.Wants("replay.") || report.Wants("video.") ? fulcrum::Run(&report) : 0;
+  return report.Wants("replay.") || report.Wants("video.") || report.Wants("dataset.") ? fulcrum::Run(&report) : 0;
 }

@@ -1,6 +1,8 @@
 // The replayer's pictures: a recorded session drawn twice.
 #include <gtest/gtest.h>
 
+#include <boost/property_tree/json_parser.hpp>
+#include <boost/property_tree/ptree.hpp>
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
@@ -158,6 +160,87 @@ TEST(Video, SaysWhyThereIsNone) {
   expect(2, {"--video", session.folder() / "missing" / "video.mp4"}, "cannot write");
   expect(2, {"--video", "video.mp4", "--within", "-1"}, "--within");
   expect(2, {"--video", "video.mp4", "--film"}, "give one of");
+}
+
+/// The files below a folder by their names from there.
+std::map<std::string, std::string> FilesBelow(const std::filesystem::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) {
+      files[std::filesystem::relative(entry.path(), folder)] = fulcrum::testing::ReadFile(entry.path());
+    }
+  }
+  return files;
+}
+
+TEST(Dataset, HasAllImagesOfEachFrameAndIsTheSameTwice) {
+  const testing::ShortSession session("dataset_test", {.seconds = 1.6}, Small);
+  const std::filesystem::path first = session.folder() / "first", second = session.folder() / "second";
+  for (const auto& folder : {first, second}) {
+    OutputOf("replayer", {session.recording(), "--dataset", folder, "--every", "0.4", "--until", "1.3"});
+  }
+  const auto files = FilesBelow(first);
+  EXPECT_TRUE(files == FilesBelow(second));
+  constexpr std::size_t kFrames = 4;  // 0, 0.4, 0.8 and 1.2 s.
+  EXPECT_EQ(files.size(), 9 * kFrames + (kFrames - 1) + 4) << "nine images a frame, flow between them, four files";
+  for (const auto& [name, format] : std::map<std::string, std::string>{{"left/000002.png", "rgb24"},
+                                                                       {"right/000003.png", "rgb24"},
+                                                                       {"depth/000003.png", "gray16be"},
+                                                                       {"normal/000003.png", "rgb24"},
+                                                                       {"flow/000002.png", "rgb48be"},
+                                                                       {"instance/000000.png", "gray"},
+                                                                       {"temperature/000001.png", "gray16be"},
+                                                                       {"sheet.png", "rgb24"}}) {
+    const std::string stream = OutputOf("/usr/bin/ffprobe", {"-v", "error", "-show_streams", first / name});
+    EXPECT_NE(stream.find("pix_fmt=" + format + "\n"), std::string::npos) << name << "\n" << stream;
+  }
+  EXPECT_NE(files.at("left/000000.png"), files.at("right/000000.png"));
+
+  boost::property_tree::ptree coco, calibration;
+  boost::property_tree::read_json(first / "coco.json", coco);
+  boost::property_tree::read_json(first / "calibration.json", calibration);
+  EXPECT_EQ(coco.get_child("images").size(), kFrames);
+  EXPECT_GE(coco.get_child("annotations").size(), 3 * kFrames) << "surroundings, sheet, instruments";
+  for (const auto& [key, annotation] : coco.get_child("annotations")) {
+    std::uint64_t all = 0, inside = 0, index = 0;
+    for (const auto& [unused, run] : annotation.get_child("segmentation.counts")) {
+      all += run.get_value<std::uint64_t>();
+      inside += index++ % 2 == 1 ? run.get_value<std::uint64_t>() : 0;
+    }
+    EXPECT_EQ(all, 320u * 180u);
+    EXPECT_EQ(inside, annotation.get<std::uint64_t>("area"));
+  }
+  EXPECT_EQ(calibration.get<int>("width"), 320);
+  EXPECT_NEAR(calibration.get<double>("baseline_m"), 0.005, 1e-9);
+  std::istringstream lines(files.at("frames.jsonl"));
+  std::size_t count = 0;
+  for (std::string line; std::getline(lines, line); ++count) {
+    boost::property_tree::ptree frame;
+    std::istringstream text(line);
+    boost::property_tree::read_json(text, frame);
+    EXPECT_NEAR(frame.get<double>("time_s"), 0.4 * static_cast<double>(count), 1e-9);
+    EXPECT_EQ(frame.get_child("world_to_camera").size(), 4u);
+    for (const auto& [unused, tool] : frame.get_child("tools")) EXPECT_EQ(tool.get_child("keypoints").size(), 3u);
+  }
+  EXPECT_EQ(count, kFrames);
+}
+
+TEST(Dataset, DestroysNoFolderAndRefusesImpossibleSteps) {
+  const testing::ShortSession session("no_dataset_test", {.seconds = 0.5}, Small);
+  const auto expect_refused = [&](const std::vector<std::string>& arguments, const std::string& words) {
+    std::vector<std::string> all{session.recording()};
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    fulcrum::testing::Program run("replayer", all);
+    std::optional<int> code;
+    fulcrum::testing::WaitFor(kPicturePatience_s, [&] { return (code = run.Poll()).has_value(); });
+    EXPECT_EQ(code, 2) << run.Said();
+    EXPECT_NE(run.Said().find(words), std::string::npos) << run.Said();
+  };
+  const auto before = FilesBelow(session.folder());
+  expect_refused({"--dataset", session.folder()}, "is not empty");
+  expect_refused({"--dataset", session.folder() / "d", "--every", "0"}, "--every");
+  expect_refused({"--dataset", session.folder() / "d", "--baseline", "-1"}, "--baseline");
+  EXPECT_TRUE(FilesBelow(session.folder()) == before);
 }
 
 TEST(IntoRender, DrawsTheSamePicturesToTheLastByte) {

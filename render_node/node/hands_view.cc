@@ -1,0 +1,27 @@
+#include "render_node/node/hands_view.h"
+
+#include <cmath>
+
+#include "render_node/geometry/laparoscope.h"
+
+namespace fulcrum::render {
+
+HandsView MakeHandsView(const SceneView& scene, const RenderParams& camera, int height, const ToolState& tools) {
+  const Eigen::Matrix4f view = MakeLaparoscope(camera).view;
+  constexpr float kRadPerDeg = 0.0174532925f;
+  HandsView hands;
+  hands.eye = camera.scope_tip_W;
+  hands.right = view.row(0).head<3>().transpose();
+  hands.up = view.row(1).head<3>().transpose();
+  hands.forward = -view.row(2).head<3>().transpose();
+  hands.pixel = 2.0f * std::tan(0.5f * kRadPerDeg * camera.fov_deg) / static_cast<float>(height);
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    hands.present[i] = tools.tools[i].kind != ToolKind::kNone && !scene.tools[i].assists();
+    hands.scope[i] = tools.tools[i].kind == ToolKind::kScope;
+    hands.tip[i] = tools.tools[i].p_WT;
+    hands.force_N[i] = tools.tools[i].f_W.norm();
+  }
+  return hands;
+}
+
+}  // namespace fulcrum::render

@@ -1,0 +1,89 @@
+#include "render_node/scene_graph/drawn_surfaces.h"
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+#include <osg/Camera>
+#include <osg/CullFace>
+#include <osg/Geode>
+#include <osg/Geometry>
+#include <osg/MatrixTransform>
+#include <osg/NodeVisitor>
+#include <string_view>
+#include <utility>
+
+#include "render_node/scene_graph/instruments.h"
+
+namespace fulcrum::render {
+namespace {
+
+constexpr std::array<std::string_view, 10> kSurfaces{"rectum", "fat",     "membrane", "surroundings", "breathing",
+                                                     "hook",   "grasper", "jaw",      "blade",        "instrument"};
+
+class Collector final : public osg::NodeVisitor {
+ public:
+  Collector() : osg::NodeVisitor(TRAVERSE_ALL_CHILDREN) {}
+
+  void apply(osg::Camera& camera) override { traverse(camera); }  // Its matrix is no place of its content.
+  void apply(osg::MatrixTransform& transform) override {
+    const osg::Matrix before = place_;
+    const int tool = tool_;
+    place_ = transform.getMatrix() * place_;
+    if (const int named = ToolNamed(transform.getName()); named >= 0) tool_ = named;
+    traverse(transform);
+    place_ = before;
+    tool_ = tool;
+  }
+  void apply(osg::Geometry& geometry) override {
+    if (std::find(kSurfaces.begin(), kSurfaces.end(), geometry.getName()) == kSurfaces.end()) return;
+    DrawnSurface surface;
+    surface.name = geometry.getName();
+    surface.tool = tool_;
+    surface.part = parts_[{surface.name, tool_}]++;
+    Read(geometry, &surface);
+    surfaces.push_back(std::move(surface));
+  }
+
+  std::vector<DrawnSurface> surfaces;
+
+ private:
+  void Read(const osg::Geometry& geometry, DrawnSurface* surface) const {
+    const osg::StateSet* state = geometry.getStateSet();
+    osg::Vec3 shift;
+    float behind = 0;
+    if (state != nullptr) {
+      if (const osg::Uniform* uniform = state->getUniform("behind")) uniform->get(behind);
+      if (const osg::Uniform* uniform = state->getUniform("shift")) uniform->get(shift);
+      surface->cull_back = state->getAttribute(osg::StateAttribute::CULLFACE) != nullptr;
+    }
+    surface->behind_m = static_cast<double>(behind);
+    const auto& positions = dynamic_cast<const osg::Vec3Array&>(*geometry.getVertexArray());
+    surface->positions_W.reserve(positions.size());
+    for (const osg::Vec3& p : positions) {
+      const osg::Vec3d p_W = osg::Vec3d(p + shift) * place_;
+      surface->positions_W.emplace_back(p_W.x(), p_W.y(), p_W.z());
+    }
+    const auto& corners = dynamic_cast<const osg::DrawElementsUInt&>(*geometry.getPrimitiveSet(0));
+    surface->triangles.resize(corners.size() / 3);
+    for (std::size_t t = 0; t < surface->triangles.size(); ++t) {
+      for (std::size_t k = 0; k < 3; ++k) surface->triangles[t][k] = corners[3 * t + k];
+    }
+    if (const auto* coordinates = dynamic_cast<const osg::Vec4Array*>(geometry.getTexCoordArray(0))) {
+      for (const osg::Vec4& c : *coordinates) surface->coordinates.push_back({c[0], c[1], c[2], c[3]});
+    }
+  }
+
+  osg::Matrix place_;
+  int tool_ = -1;
+  std::map<std::pair<std::string, int>, int> parts_;
+};
+
+}  // namespace
+
+std::vector<DrawnSurface> DrawnSurfaces(osg::Node* root) {
+  Collector collector;
+  root->accept(collector);
+  return std::move(collector.surfaces);
+}
+
+}  // namespace fulcrum::render

@@ -1,0 +1,145 @@
+#include "services/apps/replayer/dataset.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <future>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "services/apps/replayer/channels.h"
+#include "services/apps/replayer/coco.h"
+#include "services/apps/replayer/dataset_sheet.h"
+#include "services/apps/replayer/frame_text.h"
+#include "services/apps/replayer/projector.h"
+#include "services/apps/replayer/report_format.h"
+#include "services/apps/replayer/truth.h"
+#include "services/base/core/error.h"
+
+namespace fulcrum::replay {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kWriters = 2;
+constexpr const char* kFolders[] = {"left",     "right", "depth",       "normal", "flow",
+                                    "instance", "class", "temperature", "damage", "water"};
+
+void MakeFolders(const DatasetSettings& settings) {
+  std::error_code error;
+  if (fs::exists(settings.folder) && !fs::is_empty(settings.folder, error)) {
+    throw InputError(settings.folder.string() + ": is not empty; name a new folder");
+  }
+  for (const std::string folder : kFolders) {
+    if (folder == "right" && settings.baseline_m <= 0) continue;
+    fs::create_directories(settings.folder / folder, error);
+    if (error) throw InputError(settings.folder.string() + ": cannot be made: " + error.message());
+  }
+}
+
+std::string FileName(std::uint64_t frame) { return Format("%06llu.png", static_cast<unsigned long long>(frame)); }
+
+class DatasetMaker {
+ public:
+  DatasetMaker(const DatasetSettings& settings, const SceneView& scene)
+      : settings_(settings),
+        scene_(scene),
+        projector_(settings.recording, scene),
+        coco_((MakeFolders(settings), settings.folder / "coco.json")),
+        frames_(settings.folder / "frames.jsonl"),
+        writer_(kWriters) {
+    projector_.node().view().SetDetail(kTruthDetail);
+    end_s_ = settings.until_s >= 0 ? std::min(settings.until_s, projector_.end_s()) : projector_.end_s();
+    count_ = static_cast<std::uint64_t>(std::floor(end_s_ / settings.every_s + 1e-6)) + 1;
+  }
+
+  DatasetResult Make(const std::function<void(double)>& progress) {
+    for (std::uint64_t i = 0; i < count_; ++i) {
+      const double time_s = static_cast<double>(i) * settings_.every_s;
+      projector_.GoTo(time_s);
+      // The first frames show the first tissue if it came later.
+      if (render::Bitmap first; i == 0 && !projector_.Draw(&first))
+        throw std::runtime_error("the recording has no tissue to show");
+      Add(i, time_s);
+      if (progress) progress(time_s);
+    }
+    images_.get();
+    writer_.Finish();
+    coco_.Finish();
+    if (!frames_.flush()) throw InputError((settings_.folder / "frames.jsonl").string() + ": cannot be written");
+    sheet_.Write(settings_.folder / "sheet.png");
+    return {count_, static_cast<double>(count_ - 1) * settings_.every_s};
+  }
+
+ private:
+  /// Draws a frame. Its ground truth is computed on another thread while the next frame is drawn.
+  void Add(std::uint64_t frame, double time_s) {
+    render::RenderNode& node = projector_.node();
+    const RenderParams camera = node.camera();
+    Frame drawn{frame, time_s, {}, {}, FrameState(node), std::nullopt};
+    node.DrawFrom(camera, &drawn.left);
+    drawn.moment.emplace(&node.view(), render::MakeLaparoscope(camera), scene_, drawn.left.width, drawn.left.height);
+    if (settings_.baseline_m > 0) node.DrawFrom(RightOf(camera, settings_.baseline_m), &drawn.right);
+    if (images_.valid()) images_.get();
+    images_ = std::async(std::launch::async, [this, given = std::move(drawn)]() mutable { Write(std::move(given)); });
+  }
+
+  struct Frame {
+    std::uint64_t index;
+    double time_s;
+    render::Bitmap left, right;
+    FrameState state;
+    std::optional<Moment> moment;
+  };
+
+  void Write(Frame frame) {
+    auto truth = std::make_unique<const Truth>(*std::move(frame.moment));
+    const std::uint64_t i = frame.index;
+    if (i == 0) {
+      WriteText(settings_.folder / "calibration.json", CalibrationText(truth->camera(), settings_.baseline_m));
+    }
+    Write("left", i, FromBitmap(frame.left));
+    if (settings_.baseline_m > 0) Write("right", i, FromBitmap(frame.right));
+    Write("depth", i, truth->Depth());
+    Write("normal", i, truth->Normals());
+    Write("class", i, truth->Classes());
+    Write("instance", i, truth->Instances());
+    Write("temperature", i, truth->temperature());
+    Write("damage", i, truth->damage());
+    Write("water", i, truth->water());
+    if (before_) Write("flow", i - 1, before_->FlowTo(*truth));
+    coco_.Add(static_cast<int>(i), "left/" + FileName(i), *truth);
+    frames_ << FrameText(i, frame.time_s, frame.state, scene_, *truth) << '\n';
+    before_ = std::move(truth);
+  }
+
+  void Write(const std::string& folder, std::uint64_t frame, Channel channel) {
+    if (frame == count_ / 2) sheet_.Add(folder, channel);
+    writer_.Add(std::move(channel), settings_.folder / folder / FileName(frame));
+  }
+
+  const DatasetSettings& settings_;
+  const SceneView& scene_;
+  Projector projector_;
+  CocoFile coco_;
+  std::ofstream frames_;
+  DatasetSheet sheet_;
+  double end_s_ = 0;
+  std::uint64_t count_ = 0;
+  std::unique_ptr<const Truth> before_;
+  ChannelWriter writer_;
+  std::future<void> images_;  // Last: it uses the others.
+};
+
+}  // namespace
+
+DatasetResult MakeDataset(const DatasetSettings& settings, const SceneView& scene,
+                          const std::function<void(double)>& progress) {
+  return DatasetMaker(settings, scene).Make(progress);
+}
+
+}  // namespace fulcrum::replay

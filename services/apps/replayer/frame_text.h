@@ -1,0 +1,33 @@
+// Camera and instruments of a frame of a data set, as JSON.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "render_node/node/render_node.h"
+#include "services/apps/replayer/truth.h"
+
+namespace fulcrum::replay {
+
+/// The camera moved to its right [m]; both look in the same direction.
+[[nodiscard]] RenderParams RightOf(const RenderParams& camera, double baseline_m);
+
+/// Intrinsics of both cameras, units of the images, names of the classes.
+[[nodiscard]] std::string CalibrationText(const render::Pinhole& camera, double baseline_m);
+
+/// What a line needs of the renderer.
+struct FrameState {
+  explicit FrameState(const render::RenderNode& node)
+      : tools(node.tools().tools), handles(node.handles()), force_N(node.forces()) {}
+
+  std::array<ToolSample, kMaxTools> tools;
+  HandleState handles;
+  std::array<float, kMaxTools> force_N;
+};
+
+/// One line: time, camera, and each instrument's pose, jaw, force and keypoints.
+[[nodiscard]] std::string FrameText(std::uint64_t frame, double time_s, const FrameState& state, const SceneView& scene,
+                                    const Truth& truth);
+
+}  // namespace fulcrum::replay

@@ -1,0 +1,274 @@
+// The ground truth of a picture against OpenGL, which draws the depth and the number of each surface as colours, and
+// against itself a moment later.
+#include "services/apps/replayer/truth.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <osg/Geode>
+#include <osg/Geometry>
+#include <osg/NodeVisitor>
+#include <osg/Program>
+#include <regex>
+#include <set>
+#include <string>
+
+#include "render_node/scene_graph/display.h"
+#include "services/apps/replayer/coco.h"
+#include "services/scene/builder/build.h"
+#include "tests/integration/render/synthetic_scene.h"
+
+namespace fulcrum::replay {
+namespace {
+
+using render::Hit;
+using render::LaparoscopeView;
+
+TruthClass ClassNamed(const std::string& name) {
+  if (name == "rectum") return TruthClass::kRectum;
+  if (name == "fat") return TruthClass::kFat;
+  if (name == "membrane") return TruthClass::kMembrane;
+  if (name == "surroundings" || name == "breathing") return TruthClass::kSurroundings;
+  return name == "mask" ? TruthClass::kNone : TruthClass::kGrasper;  // Any instrument.
+}
+
+/// Makes all programs draw depth [m] in red and green and the class in blue, and removes the effects.
+class DrawTruth final : public osg::NodeVisitor {
+ public:
+  DrawTruth() : osg::NodeVisitor(TRAVERSE_ALL_CHILDREN) {}
+  void apply(osg::Geode& geode) override {
+    for (unsigned k = geode.getNumDrawables(); k-- > 0;) {
+      const std::string name = geode.getDrawable(k)->getName();
+      if (name == "smoke" || name == "shadow") {
+        geode.removeDrawables(k);
+      } else if (name != "field" && name != "overlay" && geode.getDrawable(k)->getStateSet() != nullptr) {
+        Change(geode.getDrawable(k)->getStateSet(), name);
+      }
+    }
+  }
+  void apply(osg::Group& group) override {
+    // The instruments have one program at their root.
+    if (group.getStateSet() != nullptr) Change(group.getStateSet(), "instrument");
+    traverse(group);
+  }
+
+ private:
+  void Change(osg::StateSet* state, const std::string& name) {
+    auto* program = dynamic_cast<osg::Program*>(state->getAttribute(osg::StateAttribute::PROGRAM));
+    if (program == nullptr || name == "mask" || !changed_.insert(program).second) return;
+    state->setMode(GL_BLEND, osg::StateAttribute::OFF);
+    for (unsigned s = 0; s < program->getNumShaders(); ++s) {
+      osg::Shader* shader = program->getShader(s);
+      if (shader->getType() != osg::Shader::FRAGMENT) continue;
+      std::string text = shader->getShaderSource();
+      text = std::regex_replace(text, std::regex(R"(max\(heat\.a, heat_below\.a\) < 0\.5)"), "heat.a < 0.5");
+      const std::string opened = name == "fat" ? "if (coordinate.w <= 0.5 && heat.a >= 0.5) discard;" : "";
+      const std::string number = std::to_string(static_cast<int>(ClassNamed(name)));
+      const std::size_t last = text.rfind("fragment = ");
+      ASSERT_NE(last, std::string::npos) << name;
+      text.replace(last, text.find(';', last) + 1 - last,
+                   opened +
+                       "float distance_m = clamp(-position.z, 0.0, 1.0) * 255.0;"
+                       "fragment = vec4(floor(distance_m) / 255.0, fract(distance_m), " +
+                       number + ".0 / 255.0, 1.0);");
+      shader->setShaderSource(text);
+    }
+  }
+  std::set<osg::Program*> changed_;
+};
+
+/// Whether the depth changes by more than a millimetre from this pixel to the next.
+bool AtAnEdge(const Truth& truth, int x, int y) {
+  const float here = truth.raster().At(x, y).depth_m;
+  const auto far = [&](int column, int row) { return std::abs(truth.raster().At(column, row).depth_m - here) > 1e-3f; };
+  return far(std::max(0, x - 1), y) || far(std::min(truth.camera().width - 1, x + 1), y) ||
+         far(x, std::max(0, y - 1)) || far(x, std::min(truth.camera().height - 1, y + 1));
+}
+
+class TruthTest : public ::testing::Test {
+ protected:
+  TruthTest() : data_(scene::BuildProcedural(scene::BuiltIn())), scene_(data_.View()) {
+    scene_.render.width = 480;
+    scene_.render.height = 270;
+    laparoscope_.emplace(scene_);
+    laparoscope_->SetDetail(kTruthDetail);
+  }
+  void Show(double time_s) {
+    const render::SyntheticMoment moment = render::MakeSyntheticMoment(scene_, time_s);
+    laparoscope_->SetTissue(moment.tissue.xyz);
+    laparoscope_->SetTopology(moment.topology);
+    for (const TemperaturePatch& patch : moment.patches) laparoscope_->ApplyPatch(patch);
+    for (int tool = 0; tool < kMaxTools; ++tool) {
+      const auto k = static_cast<std::size_t>(tool);
+      laparoscope_->SetTool(tool, moment.tools.tools[k]);
+      laparoscope_->SetJaw(tool, moment.handles.handles[k].jaw_angle_rad);
+    }
+    laparoscope_->Update();
+  }
+  /// @param finer times as many lines as the picture.
+  Truth TruthNow(int finer = 1) {
+    return Truth({&*laparoscope_, laparoscope_->laparoscope(), scene_, finer * static_cast<int>(scene_.render.width),
+                  finer * static_cast<int>(scene_.render.height)});
+  }
+
+  scene::SceneData data_;
+  SceneView scene_;
+  std::optional<LaparoscopeView> laparoscope_;
+};
+
+TEST_F(TruthTest, IsWhatOpenGLDraws) {
+  Show(14);  // The tent is lifted, the slit is open, both instruments are in the field.
+  const Truth truth = TruthNow();
+  DrawTruth change;
+  laparoscope_->root()->accept(change);
+  const auto display = render::MakeOffscreenDisplay(*laparoscope_, scene_.render);
+  render::Bitmap drawn;
+  display->DrawAndRead(&drawn);
+
+  std::array<double, kTruthClasses> both{}, either{};
+  double worst_m = 0;
+  for (int y = 0; y < drawn.height; ++y) {
+    for (int x = 0; x < drawn.width; ++x) {
+      const Hit& hit = truth.raster().At(x, y);
+      const std::uint8_t* pixel = &drawn.rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(drawn.width) +
+                                                  static_cast<std::size_t>(x))];
+      const TruthClass what = truth.ClassOf(hit);
+      const auto mine = static_cast<std::size_t>(IsTool(what) ? TruthClass::kGrasper : what);
+      const std::size_t theirs = pixel[2];
+      ASSERT_LT(theirs, either.size());
+      if (mine == theirs) ++both[mine];
+      if (mine == theirs) ++either[mine];
+      if (mine != theirs) ++either[mine], ++either[theirs];
+      const double depth_m = (pixel[0] + pixel[1] / 255.0) / 255;
+      if (mine != theirs || !hit.any() || AtAnEdge(truth, x, y)) continue;
+      worst_m = std::max(worst_m, std::abs(depth_m - static_cast<double>(hit.depth_m)));
+    }
+  }
+  for (const TruthClass what :
+       {TruthClass::kNone, TruthClass::kSurroundings, TruthClass::kFat, TruthClass::kMembrane, TruthClass::kGrasper}) {
+    const auto k = static_cast<std::size_t>(what);
+    EXPECT_GT(either[k], 100) << NameOf(what) << " is in the picture";
+    EXPECT_GE(both[k] / either[k], what == TruthClass::kFat ? 0.9 : 0.98) << NameOf(what);
+  }
+  EXPECT_LT(worst_m, 1e-4);
+}
+
+TEST_F(TruthTest, APixelIsWhereItsPointIs) {
+  Show(14);
+  const Truth truth = TruthNow();
+  for (int y = 0; y < truth.camera().height; y += 3) {
+    for (int x = 0; x < truth.camera().width; x += 3) {
+      const Hit& hit = truth.raster().At(x, y);
+      if (!hit.any()) continue;
+      const auto [place, depth] = truth.PlaceOf(truth.PointOf(hit));
+      EXPECT_NEAR(place.x(), x + 0.5, 1e-3);
+      EXPECT_NEAR(place.y(), y + 0.5, 1e-3);
+      EXPECT_NEAR(depth, static_cast<double>(hit.depth_m), 1e-6);
+    }
+  }
+}
+
+/// Material coordinates at a place between pixels; none beside the sheet.
+std::optional<Vec2d> MaterialAt(const Truth& truth, const Vec2d& place) {
+  const double x = place.x() - 0.5, y = place.y() - 0.5;
+  const int left = static_cast<int>(std::floor(x)), low = static_cast<int>(std::floor(y));
+  Vec2d mean = Vec2d::Zero();
+  for (int k = 0; k < 4; ++k) {
+    const int column = left + k % 2, row = low + k / 2;
+    const auto material = truth.MaterialOf(truth.raster().At(column, row));
+    if (!material || truth.ClassOf(truth.raster().At(column, row)) != TruthClass::kMembrane) return std::nullopt;
+    mean += (1 - std::abs(x - column)) * (1 - std::abs(y - row)) * *material;
+  }
+  return mean;
+}
+
+TEST_F(TruthTest, FlowLeadsToTheSameTissue) {
+  Show(5);
+  const Truth before = TruthNow();
+  Show(5.2);
+  // Finer, because the sheet's coordinates are read between pixels, where it is bent.
+  constexpr int kFiner = 4;
+  const Truth after = TruthNow(), fine = TruthNow(kFiner);
+  Channel flow = before.FlowTo(after);
+  int compared = 0;
+  double moved = 0, worst_px = 0;
+  for (int y = 1; y + 1 < flow.height; ++y) {
+    for (int x = 1; x + 1 < flow.width; ++x) {
+      const Vec2d here(x + 0.5, flow.height - y - 0.5);  // From the lower left.
+      if (flow.At(x, y, 2) != static_cast<int>(FlowState::kVisible)) continue;
+      const Vec2d step(kFlowUnit_px * (flow.At(x, y, 0) - 32768.0), -kFlowUnit_px * (flow.At(x, y, 1) - 32768.0));
+      const auto from = MaterialAt(before, here);
+      const Vec2d there = here + step;
+      if (!from || there.x() < 2 || there.y() < 2 || there.x() > flow.width - 2 || there.y() > flow.height - 2)
+        continue;
+      const auto at = [&](double right, double up) { return MaterialAt(fine, kFiner * (there + Vec2d(right, up))); };
+      const auto to = at(0, 0), right = at(1, 0), up = at(0, 1);
+      if (!to || !right || !up) continue;
+      Eigen::Matrix2d pixel;
+      pixel << *right - *to, *up - *to;
+      const double error_px = (pixel.inverse() * (*to - *from)).norm();
+      // Where the sheet is bent within a pixel or seen from the side its material is not linear between pixels.
+      const double size = std::sqrt(std::abs(pixel.determinant()));
+      if (pixel.col(0).norm() > 2 * size || pixel.col(1).norm() > 2 * size) continue;
+      worst_px = std::max(worst_px, error_px);
+      moved = std::max(moved, step.norm());
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 5000);
+  EXPECT_GT(moved, 1) << "something moves";
+  EXPECT_LT(worst_px, 0.1);
+}
+
+TEST_F(TruthTest, WhatAnInstrumentCoversNextIsHidden) {
+  Show(6);
+  const Truth before = TruthNow();
+  Show(8);
+  const Truth after = TruthNow();
+  Channel flow = before.FlowTo(after), classes = after.Classes();
+  int hidden = 0, wrong = 0;
+  for (int y = 0; y < flow.height; ++y) {
+    for (int x = 0; x < flow.width; ++x) {
+      if (flow.At(x, y, 2) != static_cast<int>(FlowState::kHidden)) continue;
+      ++hidden;
+      const int u = static_cast<int>(std::floor(x + 0.5 + kFlowUnit_px * (flow.At(x, y, 0) - 32768.0)));
+      const int v = static_cast<int>(std::floor(y + 0.5 + kFlowUnit_px * (flow.At(x, y, 1) - 32768.0)));
+      if (u < 0 || v < 0 || u >= flow.width || v >= flow.height || classes.At(u, v) == 0) continue;
+      const auto what = static_cast<TruthClass>(classes.At(u, v));
+      wrong += !IsTool(what) && what == before.ClassOf(before.raster().At(x, flow.height - 1 - y)) ? 1 : 0;
+    }
+  }
+  EXPECT_GT(hidden, 200);
+  EXPECT_LT(wrong, hidden / 10) << "hidden behind itself: the tent's far side only";
+}
+
+TEST_F(TruthTest, HeatIsThatOfTheSheet) {
+  Show(14);
+  const Truth truth = TruthNow();
+  Channel temperature = truth.temperature(), damage = truth.damage(), classes = truth.Classes();
+  int cold = 0, burnt = 0;
+  for (int y = 0; y < classes.height; ++y) {
+    for (int x = 0; x < classes.width; ++x) {
+      const auto what = static_cast<TruthClass>(classes.At(x, y));
+      const bool sheet = what == TruthClass::kMembrane || what == TruthClass::kFat;
+      EXPECT_EQ(temperature.At(x, y) != 0, sheet) << x << " " << y;
+      cold += sheet && damage.At(x, y) == 0 && std::abs(temperature.At(x, y) * kTemperatureUnit_C - 37) < 0.3 ? 1 : 0;
+      burnt += damage.At(x, y) > 128 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(cold, 5000);
+  EXPECT_GT(burnt, 20);
+}
+
+TEST(RunLengths, AlternateColumnByColumnFromZero) {
+  Channel image(3, 2, 8, 1);
+  image.At(0, 0) = image.At(0, 1) = image.At(1, 0) = 7;
+  image.At(2, 1) = 3;
+  EXPECT_EQ(RunLengths(image, 7), (std::vector<std::uint32_t>{0, 3, 3}));
+  EXPECT_EQ(RunLengths(image, 3), (std::vector<std::uint32_t>{5, 1}));
+  EXPECT_EQ(RunLengths(image, 9), (std::vector<std::uint32_t>{6}));
+}
+
+}  // namespace
+}  // namespace fulcrum::replay
