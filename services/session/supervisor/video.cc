@@ -75,6 +75,16 @@ std::optional<runtime::ProcessEnd> Await(runtime::ChildProcess* child, const std
   return std::nullopt;
 }
 
+/// Removes what a killed replayer has left: files beside the video whose names begin with its name.
+void RemoveParts(const fs::path& video) {
+  std::error_code ignored;
+  std::vector<fs::path> parts;
+  for (const auto& entry : fs::directory_iterator(video.parent_path(), ignored)) {
+    if (entry.path().filename().string().starts_with(video.filename().string() + ".")) parts.push_back(entry.path());
+  }
+  for (const fs::path& part : parts) fs::remove(part, ignored);
+}
+
 }  // namespace
 
 SessionVideo MakeVideo(const VideoOrder& order, const std::function<bool()>& goes_on) {
@@ -86,8 +96,13 @@ SessionVideo MakeVideo(const VideoOrder& order, const std::function<bool()>& goe
          std::to_string(kWithin_s), "--json", json.string()},
         order.log);
     const std::optional<runtime::ProcessEnd> end = Await(&child, goes_on);
-    if (!end) return {.missing = "it was not ready in time, or left out by Ctrl-C"};
+    if (!end) {
+      child = {};  // Killed.
+      RemoveParts(order.video);
+      return {.missing = "it was not ready in time, or left out by Ctrl-C"};
+    }
     if (end->signal != 0 || end->exit_code != 0) {
+      RemoveParts(order.video);
       const std::string words = LastWords(order.log);
       return {.missing = words.empty() ? "replayer " + end->Describe() : words};
     }

@@ -1,8 +1,12 @@
 // Recordings of real processes over the real bus.
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <unistd.h>
 
+#include <filesystem>
 #include <map>
+#include <optional>
+#include <string>
 
 #include "services/records/log_tools/tools.h"
 #include "services/transport/bus/gate.h"
@@ -123,6 +127,53 @@ TEST(RestartedRecorder, LeavesOneRecordingThatNamesTheBreak) {
   EXPECT_GT(last_s, 4) << "recorded up to the end of the session";
   EXPECT_TRUE(recording.reader().closed());
   EXPECT_NE(recording.reader().metadata().at("merged").at("breaks"), "");
+}
+
+/// `fulcrum up` with a recording and, unlike Cart, its video.
+class FilmedSession {
+ public:
+  FilmedSession()
+      : up_("fulcrum",
+            {"up", "small", "--record", "--seconds", "2", "--domain", std::to_string(kCartDomain), "--out", folder_}) {}
+  ~FilmedSession() {
+    up_ = Program();
+    fs::remove_all(folder_);
+  }
+  FilmedSession(const FilmedSession&) = delete;
+  FilmedSession& operator=(const FilmedSession&) = delete;
+
+  [[nodiscard]] const Program& up() const { return up_; }
+  void ExpectEndsWell() {
+    std::optional<int> code;
+    testing::WaitFor(90, [&] { return (code = up_.Poll()).has_value(); });
+    EXPECT_EQ(code, 0) << up_.Said();
+  }
+  [[nodiscard]] fs::path video() const { return folder_ / "latest" / "video.mp4"; }
+  [[nodiscard]] std::string report() const { return testing::ReadFile(folder_ / "latest" / "report.html"); }
+
+ private:
+  const fs::path folder_ = fs::temp_directory_path() / ("fulcrum-filmed-" + std::to_string(::getpid()));
+  Program up_;
+};
+
+TEST(RecordedCart, TheReportContainsTheVideo) {
+  FilmedSession session;
+  session.ExpectEndsWell();
+  EXPECT_GT(fs::file_size(session.video()), 10'000u);
+  EXPECT_NE(session.report().find("data:video/mp4;base64,"), std::string::npos);
+  EXPECT_NE(session.report().find("0:00 start"), std::string::npos) << "its chapters";
+}
+
+TEST(RecordedCart, CtrlCLeavesTheVideoOut) {
+  FilmedSession session;
+  ASSERT_TRUE(testing::WaitFor(60, [&] { return session.up().Said().find("drawing the video") != std::string::npos; }))
+      << session.up().Said();
+  session.up().Signal(SIGINT);
+  session.ExpectEndsWell();
+  for (const auto& file : fs::directory_iterator(session.video().parent_path())) {
+    EXPECT_FALSE(file.path().filename().string().starts_with("video.mp4")) << file.path();
+  }
+  EXPECT_NE(session.report().find("fulcrum log video"), std::string::npos) << "how to draw it later";
 }
 
 }  // namespace
