@@ -74,8 +74,6 @@ class RenderNode {
   [[nodiscard]] const RenderParams& camera() const { return camera_.params(); }
   [[nodiscard]] const ToolState& tools() const { return tools_; }
   [[nodiscard]] const HandleState& handles() const { return handles_; }
-  /// Force of the tissue on each tool [N].
-  [[nodiscard]] const std::array<float, kMaxTools>& forces() const { return force_N_; }
 
   /// Time between two steps. In a window the scene sets the wanted rate of pictures, the cart (`cart_ns`) the rate that
   /// the machine can reach, and the lower one is used. An operator's hand and readers of live pictures wait for theirs:

@@ -197,7 +197,7 @@ ExitCode Map(const po::variables_map& values, const Files& files) {
 void AddVideoOptions(po::options_description* options) {
   options->add_options()  //
       ("out", po::value<std::string>()->value_name("FILE"),
-       "MP4 file to write (default: video.mp4 beside the recording)")  //
+       "MP4 file to write (default: video.mp4 beside recording.mcap, FILE with .mp4 for another name)")  //
       ("until", po::value<std::string>()->value_name("SECONDS"),
        "end at this session time [s] (default: the end of the recording)")  //
       ("scene", po::value<std::string>()->value_name("FILE"),
@@ -209,8 +209,10 @@ ExitCode Video(const po::variables_map& values, const Files& files) {
   if (files.size() != 1) {
     throw InputError("video needs one file, got " + std::to_string(files.size()) + "; see fulcrum log video --help");
   }
-  const std::string video = values.count("out") != 0 ? values["out"].as<std::string>()
-                                                     : fs::path(files[0]).replace_filename("video.mp4").string();
+  // Of a session folder its video; recordings of many sessions may lie side by side in another folder.
+  const fs::path beside = files[0].filename() == "recording.mcap" ? fs::path(files[0]).replace_filename("video.mp4")
+                                                                  : fs::path(files[0]).replace_extension(".mp4");
+  const std::string video = values.count("out") != 0 ? values["out"].as<std::string>() : beside.string();
   Words command{"replayer", files[0].string(), "--video=" + video};
   for (const char* name : {"until", "scene"}) {
     if (values.count(name) != 0) command.push_back(std::string("--") + name + '=' + values[name].as<std::string>());

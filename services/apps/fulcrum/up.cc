@@ -71,7 +71,8 @@ ExitCode Up(const Words& words) {
        "may be repeated")  //
       ("record", "record all topics into recording.mcap in the session folder")(
           "record-to", po::value<std::string>()->value_name("FILE|DIR"), "record all topics into this file or folder")(
-          "no-video", "draw no video of a recorded session for the report; fulcrum log video draws it later")(
+          "no-video",
+          "draw no video of a recorded session for the report (services draw none); fulcrum log video draws it later")(
           "keep-last", po::value<double>()->value_name("SECONDS"),
           "keep the newest seconds in memory, above 0, at most 3600, and write them into a file when a node dies, when "
           "its Health turns to degraded, and at fulcrum dump (default: off)")(
@@ -181,7 +182,8 @@ ExitCode Up(const Words& words) {
   } else if (values.count("record") != 0) {
     settings.record = fs::path();
   }
-  settings.video = values.count("no-video") == 0;
+  // A service stops soon, and its memory may not be run, as software OpenGL needs it.
+  settings.video = values.count("no-video") == 0 && settings.attach.empty();
   if (values.count("keep-last") != 0) {
     settings.keep_s = values["keep-last"].as<double>();
     if (!(settings.keep_s > 0 && settings.keep_s <= 3600)) {

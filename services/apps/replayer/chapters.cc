@@ -1,5 +1,6 @@
 #include "services/apps/replayer/chapters.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "services/base/core/generator_inputs.h"
@@ -44,6 +45,7 @@ const char* Alarm(ThermalEventKind kind) {
 
 void Chapters::Follow(double time_s, const HandleState& handles, const GeneratorSetting& generator,
                       const ThermalEvent& event) {
+  time_s = std::max(0.0, time_s);  // A pedal may be down before the session begins.
   const CauteryMode mode = ModeOf(handles.pedals);
   if (const float power_W = PowerOf(generator, mode); power_W > 0) Note(time_s, Used(mode, power_W));
   if (event.stamp.epoch == event_epoch_ && event.stamp.sequence == event_sequence_) return;

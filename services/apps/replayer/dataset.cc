@@ -29,11 +29,15 @@ constexpr int kWriters = 2;
 constexpr const char* kFolders[] = {"left",     "right", "depth",       "normal", "flow",
                                     "instance", "class", "temperature", "damage", "water"};
 
+void RefuseFilled(const fs::path& folder) {
+  std::error_code error;
+  if (fs::exists(folder) && !fs::is_empty(folder, error)) {
+    throw InputError(folder.string() + ": is not empty; name a new folder");
+  }
+}
+
 void MakeFolders(const DatasetSettings& settings) {
   std::error_code error;
-  if (fs::exists(settings.folder) && !fs::is_empty(settings.folder, error)) {
-    throw InputError(settings.folder.string() + ": is not empty; name a new folder");
-  }
   for (const std::string folder : kFolders) {
     if (folder == "right" && settings.baseline_m <= 0) continue;
     fs::create_directories(settings.folder / folder, error);
@@ -46,13 +50,8 @@ std::string FileName(std::uint64_t frame) { return Format("%06llu.png", static_c
 class DatasetMaker {
  public:
   DatasetMaker(const DatasetSettings& settings, const SceneView& scene)
-      : settings_(settings),
-        scene_(scene),
-        projector_(settings.recording, scene),
-        coco_((MakeFolders(settings), settings.folder / "coco.json")),
-        frames_(settings.folder / "frames.jsonl"),
-        writer_(kWriters) {
-    projector_.node().view().SetDetail(kTruthDetail);
+      : settings_(settings), scene_(scene), projector_(settings.recording, scene), writer_(kWriters) {
+    projector_.replay().node().view().SetDetail(kTruthDetail);
     end_s_ = settings.until_s >= 0 ? std::min(settings.until_s, projector_.end_s()) : projector_.end_s();
     count_ = static_cast<std::uint64_t>(std::floor(end_s_ / settings.every_s + 1e-6)) + 1;
   }
@@ -62,25 +61,31 @@ class DatasetMaker {
       const double time_s = static_cast<double>(i) * settings_.every_s;
       projector_.GoTo(time_s);
       // The first frames show the first tissue if it came later.
-      if (render::Bitmap first; i == 0 && !projector_.Draw(&first))
-        throw std::runtime_error("the recording has no tissue to show");
+      if (i == 0) Begin();
       Add(i, time_s);
       if (progress) progress(time_s);
     }
     images_.get();
     writer_.Finish();
-    coco_.Finish();
+    coco_->Finish();
     if (!frames_.flush()) throw InputError((settings_.folder / "frames.jsonl").string() + ": cannot be written");
     sheet_.Write(settings_.folder / "sheet.png");
     return {count_, static_cast<double>(count_ - 1) * settings_.every_s};
   }
 
  private:
+  void Begin() {
+    if (render::Bitmap first; !projector_.Draw(&first)) throw std::runtime_error("the recording has no tissue to show");
+    MakeFolders(settings_);
+    coco_.emplace(settings_.folder / "coco.json");
+    frames_.open(settings_.folder / "frames.jsonl");
+  }
+
   /// Draws a frame. Its ground truth is computed on another thread while the next frame is drawn.
   void Add(std::uint64_t frame, double time_s) {
-    render::RenderNode& node = projector_.node();
+    render::RenderNode& node = projector_.replay().node();
     const RenderParams camera = node.camera();
-    Frame drawn{frame, time_s, {}, {}, FrameState(node), std::nullopt};
+    Frame drawn{frame, time_s, {}, {}, FrameState(node, projector_.replay().contact_model()), std::nullopt};
     node.DrawFrom(camera, &drawn.left);
     drawn.moment.emplace(&node.view(), render::MakeLaparoscope(camera), scene_, drawn.left.width, drawn.left.height);
     if (settings_.baseline_m > 0) node.DrawFrom(RightOf(camera, settings_.baseline_m), &drawn.right);
@@ -112,7 +117,7 @@ class DatasetMaker {
     Write("damage", i, truth->damage());
     Write("water", i, truth->water());
     if (before_) Write("flow", i - 1, before_->FlowTo(*truth));
-    coco_.Add(static_cast<int>(i), "left/" + FileName(i), *truth);
+    coco_->Add(static_cast<int>(i), "left/" + FileName(i), *truth);
     frames_ << FrameText(i, frame.time_s, frame.state, scene_, *truth) << '\n';
     before_ = std::move(truth);
   }
@@ -125,7 +130,7 @@ class DatasetMaker {
   const DatasetSettings& settings_;
   const SceneView& scene_;
   Projector projector_;
-  CocoFile coco_;
+  std::optional<CocoFile> coco_;
   std::ofstream frames_;
   DatasetSheet sheet_;
   double end_s_ = 0;
@@ -139,6 +144,7 @@ class DatasetMaker {
 
 DatasetResult MakeDataset(const DatasetSettings& settings, const SceneView& scene,
                           const std::function<void(double)>& progress) {
+  RefuseFilled(settings.folder);
   return DatasetMaker(settings, scene).Make(progress);
 }
 

@@ -1,7 +1,5 @@
 #include "services/apps/replayer/film.h"
 
-#include <sys/resource.h>
-
 #include <charconv>
 #include <cmath>
 #include <istream>
@@ -16,8 +14,6 @@
 namespace fulcrum::replay {
 namespace {
 
-constexpr int kNice = 10;
-
 double TimeIn(const std::string& line) {
   double time_s = 0;
   const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), time_s);
@@ -30,8 +26,6 @@ double TimeIn(const std::string& line) {
 }  // namespace
 
 void ShowFilm(const std::filesystem::path& recording, const SceneView& scene, std::istream& in, std::ostream& out) {
-  // A session that runs meanwhile goes first.
-  (void)::setpriority(PRIO_PROCESS, 0, kNice);
   Projector projector(recording, scene);
   out << "end " << projector.end_s() << '\n' << std::flush;
   render::Bitmap picture;

@@ -6,6 +6,7 @@
 
 #include "render_node/geometry/solid.h"
 #include "services/apps/replayer/report_format.h"
+#include "services/base/core/contact_force.h"
 
 namespace fulcrum::replay {
 namespace {
@@ -73,6 +74,11 @@ std::string CalibrationText(const render::Pinhole& camera, double baseline_m) {
   return text + Format("],\n  \"first_tool_instance\": %d\n}\n", kFirstToolInstance);
 }
 
+FrameState::FrameState(const render::RenderNode& node, const ContactModel& contacts)
+    : tools(node.tools().tools), handles(node.handles()) {
+  for (std::size_t k = 0; k < kMaxTools; ++k) force_N[k] = TissueForce(contacts.devices[k]).norm();
+}
+
 std::string FrameText(std::uint64_t frame, double time_s, const FrameState& state, const SceneView& scene,
                       const Truth& truth) {
   std::string text =
@@ -91,7 +97,7 @@ std::string FrameText(std::uint64_t frame, double time_s, const FrameState& stat
             Format(", \"quaternion_xyzw\": [%.9g, %.9g, %.9g, %.9g]", turn.x(), turn.y(), turn.z(), turn.w()) +
             ", \"trocar_m\": " + Vector(scene.tools[k].p_WP.cast<double>()) +
             Format(", \"jaw_rad\": %.5f, \"force_N\": %.4f, \"keypoints\": [", static_cast<double>(jaw_rad),
-                   static_cast<double>(state.force_N[k]));
+                   state.force_N[k]);
     const char* comma = "";
     for (const auto& [name, p_T] : KeypointsOf(scene.tools[k], jaw_rad)) {
       text += comma + KeypointText(name, tip_W + turn * p_T, static_cast<double>(scene.tools[k].shaft_radius_m), truth);

@@ -18,12 +18,11 @@ namespace fulcrum::replay {
 
 /// What a line needs of the renderer.
 struct FrameState {
-  explicit FrameState(const render::RenderNode& node)
-      : tools(node.tools().tools), handles(node.handles()), force_N(node.forces()) {}
+  FrameState(const render::RenderNode& node, const ContactModel& contacts);
 
   std::array<ToolSample, kMaxTools> tools;
   HandleState handles;
-  std::array<float, kMaxTools> force_N;
+  std::array<double, kMaxTools> force_N{};  ///< Of the tissue on each tool.
 };
 
 /// One line: time, camera, and each instrument's pose, jaw, force and keypoints.

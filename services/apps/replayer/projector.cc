@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <string>
 
 #include "services/apps/replayer/session_facts.h"
+#include "services/base/core/error.h"
 #include "services/records/recording/mcap_reader.h"
 
 namespace fulcrum::replay {
@@ -11,6 +13,7 @@ namespace {
 
 /// Longest time between two steps of the renderer: its effects follow the instruments, and its inputs keep few samples.
 constexpr double kStep_s = 1.0 / 30;
+constexpr double kLongest_s = 7 * 24 * 3600.0;  // As of fulcrum up.
 
 double EndOf(const std::filesystem::path& recording, std::int64_t start_ns) {
   recording::McapReader reader(recording, recording::McapReader::Depth::kChunkHeads);
@@ -25,6 +28,10 @@ Projector::Projector(const std::filesystem::path& recording, const SceneView& sc
     : recording_(recording), scene_(scene) {
   Begin();
   if (Read()) end_s_ = std::max(0.0, EndOf(recording_, replay_->session_start_ns()));
+  if (end_s_ > kLongest_s) {
+    throw InputError(recording.string() + ": ends at session time " + std::to_string(end_s_) +
+                     " s; has another program removed its metadata \"clock\"?");
+  }
 }
 
 void Projector::Begin() {

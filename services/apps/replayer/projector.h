@@ -27,8 +27,8 @@ class Projector {
   /// picture before, or the recording has no tissue.
   [[nodiscard]] bool Draw(render::Bitmap* picture);
 
-  /// The renderer, at the time of the last GoTo().
-  [[nodiscard]] render::RenderNode& node() { return replay_->node(); }
+  /// The replay, at the time of the last GoTo().
+  [[nodiscard]] RenderReplay& replay() { return *replay_; }
 
   /// `follow` is called with the replay and the session time [s] after each message that is handed over from now on.
   void OnMessage(std::function<void(const RenderReplay&, double)> follow) { follow_ = std::move(follow); }

@@ -90,6 +90,8 @@ const GeneratorSetting& RenderReplay::generator() const {
 }
 const ThermalEvent& RenderReplay::event() const { return std::get<Feed<ThermalEvent>>(impl_->feeds).newest(); }
 
+const ContactModel& RenderReplay::contact_model() const { return std::get<Feed<ContactModel>>(impl_->feeds).newest(); }
+
 std::optional<double> RenderReplay::Next() {
   recording::McapMessage message{};
   while (impl_->messages.Next(&message)) {

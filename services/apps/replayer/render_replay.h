@@ -30,6 +30,7 @@ class RenderReplay {
   [[nodiscard]] const HandleState& handles() const;
   [[nodiscard]] const GeneratorSetting& generator() const;
   [[nodiscard]] const ThermalEvent& event() const;
+  [[nodiscard]] const ContactModel& contact_model() const;
 
   /// One step of the node with the messages handed over so far.
   void Step(double time_s);

@@ -1,6 +1,11 @@
 #include "services/apps/replayer/replay_run.h"
 
+#include <sys/resource.h>
+#include <sys/stat.h>
+
+#include <functional>
 #include <iostream>
+#include <stdexcept>
 
 #include "services/apps/replayer/changed_scene.h"
 #include "services/apps/replayer/console.h"
@@ -16,6 +21,7 @@
 #include "services/apps/replayer/what_if_report.h"
 #include "services/base/core/error.h"
 #include "services/base/core/exit_code.h"
+#include "services/base/runtime/realtime.h"
 #include "services/scene/format/scene_file.h"
 
 namespace fulcrum::replay {
@@ -64,9 +70,28 @@ ExitCode CompareWithRecording(const Options& options, const LockStepSettings& se
   return result.good() ? ExitCode::kDone : ExitCode::kFailure;
 }
 
+/// A session that runs meanwhile goes first.
+void GoSecond() {
+  constexpr int kNice = 10;
+  (void)::setpriority(PRIO_PROCESS, 0, kNice);
+}
+
+/// For long work into files: they are as private as recordings, and a signal ends it through the exception that the
+/// returned function throws, so that no half file remains.
+std::function<void(double)> BeginFiles(const ProgressLine& progress) {
+  GoSecond();
+  ::umask(077);
+  runtime::InstallStopSignals();
+  return [show = progress.callback()](double time_s) {
+    if (runtime::ShouldStop()) throw std::runtime_error("stopped");
+    if (show) show(time_s);
+  };
+}
+
 }  // namespace
 
 int RunFilm(const Options& options) {
+  GoSecond();
   const scene::SceneFile scene(options.scene);
   ShowFilm(options.lock_step.recording, scene.view(), std::cin, std::cout);
   return static_cast<int>(ExitCode::kDone);
@@ -77,7 +102,7 @@ int RunVideo(const Options& options) {
   const ProgressLine progress(options.quiet);
   const VideoSettings settings{options.lock_step.recording, options.video, options.lock_step.until_s,
                                options.video_within_s};
-  const VideoResult result = MakeVideo(settings, scene.view(), progress.callback());
+  const VideoResult result = MakeVideo(settings, scene.view(), BeginFiles(progress));
   progress.Clear();
   std::cout << options.video.string() << ": " << result.pictures << " pictures, " << result.duration_s << " s\n";
   if (!options.json.empty()) WriteVideoJson(result, options.json);
@@ -89,7 +114,7 @@ int RunDataset(const Options& options) {
   const ProgressLine progress(options.quiet);
   const DatasetSettings settings{options.lock_step.recording, options.dataset, options.lock_step.until_s,
                                  options.dataset_every_s, options.dataset_baseline_m};
-  const DatasetResult result = MakeDataset(settings, scene.view(), progress.callback());
+  const DatasetResult result = MakeDataset(settings, scene.view(), BeginFiles(progress));
   progress.Clear();
   std::cout << options.dataset.string() << ": " << result.frames << " frames, " << result.duration_s << " s; look at "
             << (options.dataset / "sheet.png").string() << '\n';

@@ -171,6 +171,13 @@ Vec3d Truth::PointOf(const Hit& hit) const {
   return Between(surface.positions_W, surface.triangles[hit.triangle], hit);
 }
 
+Vec3d Truth::NormalOf(const Hit& hit) const {
+  const DrawnSurface& surface = surfaces_[static_cast<std::size_t>(hit.surface)];
+  const Triangle& t = surface.triangles[hit.triangle];
+  const Vec3d &a = surface.positions_W[t[0]], &b = surface.positions_W[t[1]], &c = surface.positions_W[t[2]];
+  return (b - a).cross(c - a).normalized();
+}
+
 template <class Value>
 Channel Truth::Make(int bits, int samples, const Value& value) const {
   Channel channel(camera().width, camera().height, bits, samples);
@@ -205,11 +212,8 @@ Channel Truth::Normals() const {
   const Eigen::Matrix3d turn = world_to_camera().topLeftCorner<3, 3>();
   const Vec3d eye_W = -view_.topLeftCorner<3, 3>().transpose() * view_.topRightCorner<3, 1>();
   return Make(8, 3, [&](const Hit& hit, int, int, std::uint16_t* pixel) {
-    const DrawnSurface& surface = surfaces_[static_cast<std::size_t>(hit.surface)];
-    const Triangle& t = surface.triangles[hit.triangle];
-    const Vec3d &a = surface.positions_W[t[0]], &b = surface.positions_W[t[1]], &c = surface.positions_W[t[2]];
-    Vec3d normal = (b - a).cross(c - a).normalized();
-    if (normal.dot(a - eye_W) > 0) normal = -normal;
+    Vec3d normal = NormalOf(hit);
+    if (normal.dot(PointOf(hit) - eye_W) > 0) normal = -normal;
     const Vec3d coded = 127.5 * (turn * normal + Vec3d::Ones());
     for (int k = 0; k < 3; ++k) pixel[k] = Rounded(coded[k], 255);
   });
@@ -232,9 +236,30 @@ bool Truth::IsSame(const Hit& hit, const DrawnSurface* then) const {
     if (corner >= then->positions_W.size()) return false;
     // Corners of cut triangles get other numbers when the cut goes on.
     const auto differs = [&](std::size_t k) { return then->coordinates[corner][k] != surface.coordinates[corner][k]; };
-    if (cut && (differs(0) || differs(1))) return false;
+    if (cut && (differs(0) || differs(1) || differs(2))) return false;
   }
   return true;
+}
+
+double Truth::Footprint(const Hit& hit) const {
+  constexpr double kFlattest = 0.1;  // Cosine.
+  const Vec3d ray = PointOf(hit) + view_.topLeftCorner<3, 3>().transpose() * view_.topRightCorner<3, 1>();
+  const double facing = std::abs(NormalOf(hit).dot(ray.normalized()));
+  return static_cast<double>(hit.depth_m) / camera().focal / std::max(kFlattest, facing);
+}
+
+FlowState Truth::StateOf(const Vec2d& place, double depth_m, const DrawnSurface* surface,
+                         const std::optional<Vec2d>& material, double footprint_m) const {
+  constexpr double kSamePlace = 3;  // Pixels: the nearest pixel is up to 0.7 away, on a sheet that may be stretched.
+  if (!camera().Shows(place)) return FlowState::kHidden;
+  const Hit& hit = raster_.At(static_cast<int>(place.x()), static_cast<int>(place.y()));
+  const bool self = hit.any() && &surfaces_[static_cast<std::size_t>(hit.surface)] == surface;
+  if (depth_m > static_cast<double>(hit.depth_m) + (self ? kHiddenBySelf_m : kHidden_m)) return FlowState::kHidden;
+  if (!material) return FlowState::kVisible;
+  // Of a sheet that has been cut or burnt away meanwhile nothing is there.
+  const auto there = MaterialOf(hit);
+  const bool same = self && there && (*there - *material).norm() < kSamePlace * footprint_m;
+  return same ? FlowState::kVisible : FlowState::kNone;
 }
 
 Channel Truth::FlowTo(const Truth& next) const {
@@ -250,14 +275,8 @@ Channel Truth::FlowTo(const Truth& next) const {
     if (u < 1 || v < 1 || u > 65535 || v > 65535) return;
     pixel[0] = Rounded(u, 65535);
     pixel[1] = Rounded(v, 65535);
-    FlowState state = FlowState::kHidden;
-    if (next.camera().Shows(place)) {
-      const Hit& there = next.raster_.At(static_cast<int>(place.x()), static_cast<int>(place.y()));
-      const bool self = there.any() && &next.surfaces_[static_cast<std::size_t>(there.surface)] == then;
-      if (depth < static_cast<double>(there.depth_m) + (self ? kHiddenBySelf_m : kHidden_m))
-        state = FlowState::kVisible;
-    }
-    pixel[2] = static_cast<std::uint16_t>(state);
+    pixel[2] = static_cast<std::uint16_t>(next.StateOf(place, depth, then, MaterialOf(hit), Footprint(hit)));
+    if (pixel[2] == static_cast<std::uint16_t>(FlowState::kNone)) pixel[0] = pixel[1] = 0;
   });
 }
 

@@ -94,6 +94,13 @@ class Truth {
   void Draw(const render::Atlas& atlas);
   void TakeHeat(const render::Atlas& atlas);
   [[nodiscard]] std::optional<Corner> CoordinateOf(const render::Hit& hit) const;
+  /// Unit normal of the triangle, frame W, on either side.
+  [[nodiscard]] Vec3d NormalOf(const render::Hit& hit) const;
+  /// Size of the pixel on its surface, where that is flattest [m].
+  [[nodiscard]] double Footprint(const render::Hit& hit) const;
+  /// Whether a point that comes to this place and depth is visible here. @param material of a sheet.
+  [[nodiscard]] FlowState StateOf(const Vec2d& place, double depth_m, const render::DrawnSurface* surface,
+                                  const std::optional<Vec2d>& material, double footprint_m) const;
   /// The surfaces in another moment; null: it is gone.
   [[nodiscard]] std::vector<const render::DrawnSurface*> SurfacesIn(const Truth& other) const;
   /// Whether the triangle is the same tissue in that moment.

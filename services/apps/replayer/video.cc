@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -51,7 +50,7 @@ class VideoMaker {
     double due_s = 0;
     for (std::uint64_t i = 0; i < count; ++i) {
       const double time_s = static_cast<double>(i) * kPeriod_s;
-      if (time_s >= due_s) {
+      if (time_s >= due_s || i + 1 == count) {
         Look(time_s);
         const double period_s = NextPeriod();
         periods_s_.push_back(period_s);
@@ -83,8 +82,7 @@ class VideoMaker {
   double NextPeriod() {
     work_.used_s = watch_.s();
     if (settings_.within_s <= 0 || work_.used_s < kTrial_s) return kPeriod_s;
-    const double period_s = PeriodToFinish(work_, settings_.within_s);
-    if (period_s <= kLongestPeriod_s) return period_s;
+    if (const auto period_s = PeriodToFinish(work_, settings_.within_s)) return *period_s;
     throw std::runtime_error("the session is too long to be drawn in time, " + Format("%.0f", settings_.within_s) +
                              " s, with a picture a second; fulcrum log video draws it in full");
   }
@@ -103,14 +101,16 @@ class VideoMaker {
 
 }  // namespace
 
-double PeriodToFinish(const VideoWork& work, double within_s) {
+std::optional<double> PeriodToFinish(const VideoWork& work, double within_s) {
+  constexpr double kAim = 0.8;
   if (work.at_s >= work.end_s || work.looks == 0) return kPeriod_s;
   const double rest_s = work.end_s - work.at_s;
   const double each_s = (work.used_s - work.reading_s) / static_cast<double>(work.looks);
   const double reading_s = work.at_s > 0 ? work.reading_s / work.at_s * rest_s : 0;
-  const double left_s = within_s - work.used_s - reading_s;
-  if (left_s <= 0) return std::numeric_limits<double>::infinity();
-  return std::max(kPeriod_s, rest_s * each_s / left_s);
+  const double left_s = kAim * within_s - work.used_s - reading_s;
+  if (left_s > 0 && rest_s * each_s / left_s <= kLongestPeriod_s) return std::max(kPeriod_s, rest_s * each_s / left_s);
+  const double at_least_s = work.used_s + reading_s + rest_s / kLongestPeriod_s * each_s;
+  return at_least_s <= within_s ? std::optional(kLongestPeriod_s) : std::nullopt;
 }
 
 VideoResult MakeVideo(const VideoSettings& settings, const SceneView& scene,

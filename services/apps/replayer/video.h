@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "services/apps/replayer/chapters.h"
@@ -45,8 +46,9 @@ struct VideoWork {
   double at_s = 0, end_s = 0;  ///< Session time reached, and of the end [s].
 };
 
-/// Session time between two pictures with which the rest is ready `within_s` after the begin [s]; at least a period of
-/// kVideoRate_Hz. Infinity: reading alone takes longer.
-[[nodiscard]] double PeriodToFinish(const VideoWork& work, double within_s);
+/// Session time between two pictures so that the video is ready before `within_s`: from a period of kVideoRate_Hz to a
+/// second. None: even with a picture a second it would not be. Aims at less than `within_s`, because a later part of a
+/// session may cost more.
+[[nodiscard]] std::optional<double> PeriodToFinish(const VideoWork& work, double within_s);
 
 }  // namespace fulcrum::replay

@@ -44,7 +44,7 @@ class Run {
     }
     input_ = runtime::FileDescriptor(pair[0]);
     const runtime::FileDescriptor theirs(pair[1]);
-    Words words{"-nostdin", "-y", "-loglevel", "error"};
+    Words words{"-nostdin", "-y", "-loglevel", "error", "-xerror"};
     words.insert(words.end(), arguments.begin(), arguments.end());
     process_ = runtime::ChildProcess::StartOn(Ffmpeg(), words, {.input = theirs.get(), .output = said_.get()});
   }
@@ -63,7 +63,8 @@ class Run {
     input_.Close();
     std::optional<runtime::ProcessEnd> end;
     while (!(end = process_.Poll())) std::this_thread::sleep_for(std::chrono::milliseconds(2));
-    if (end->signal != 0 || end->exit_code != 0) Fail();
+    // It may report that it could not write the end of a file and still return 0.
+    if (end->signal != 0 || end->exit_code != 0 || ::lseek(said_.get(), 0, SEEK_END) > 0) Fail();
   }
 
  private:
@@ -78,15 +79,6 @@ class Run {
   runtime::FileDescriptor input_, said_;
   runtime::ChildProcess process_;
 };
-
-/// Throws InputError when the file cannot be written.
-fs::path Writable(const fs::path& file) {
-  if (!std::ofstream(file)) {
-    throw InputError("cannot write " + file.string() + ": " + ::strerror(errno) +
-                     "; name a folder that can be written");
-  }
-  return file;
-}
 
 /// A value in ffmpeg's file of metadata.
 std::string Escaped(const std::string& text) {
@@ -103,9 +95,9 @@ void WriteMetadata(const fs::path& file, const std::string& title, std::span<con
   std::ofstream out(file);
   out << ";FFMETADATA1\ntitle=" << Escaped(title) << '\n';
   for (std::size_t i = 0; i < chapters.size(); ++i) {
-    const double next_s = i + 1 < chapters.size() ? chapters[i + 1].begin_s : std::max(end_s, chapters[i].begin_s);
-    out << "[CHAPTER]\nTIMEBASE=1/1000\nSTART=" << ms(chapters[i].begin_s) << "\nEND=" << ms(next_s)
-        << "\ntitle=" << Escaped(chapters[i].title) << '\n';
+    const double next_s = i + 1 < chapters.size() ? chapters[i + 1].begin_s : end_s;
+    out << "[CHAPTER]\nTIMEBASE=1/1000\nSTART=" << ms(chapters[i].begin_s)
+        << "\nEND=" << ms(std::max(next_s, chapters[i].begin_s)) << "\ntitle=" << Escaped(chapters[i].title) << '\n';
   }
   if (!out.flush()) throw InputError("cannot write " + file.string());
 }
@@ -151,15 +143,32 @@ Words Encoding(int width, int height, int rate_Hz, const fs::path& file) {
 }  // namespace
 
 struct VideoFile::Impl {
-  Impl(fs::path to, int width, int height, int rate_Hz)
-      : file(std::move(to)), encoder(Encoding(width, height, rate_Hz, Writable(pictures))) {}
-  ~Impl() {
-    std::error_code ignored;
-    for (const fs::path& part : {pictures, metadata, complete}) fs::remove(part, ignored);
-  }
+  /// Files on the way to the video, removed with this object.
+  struct Parts {
+    explicit Parts(const fs::path& video)
+        : pictures(video.string() + ".pictures"),
+          metadata(video.string() + ".chapters"),
+          complete(video.string() + ".part") {
+      if (!std::ofstream(pictures)) {
+        throw InputError("cannot write " + pictures.string() + ": " + ::strerror(errno) +
+                         "; name a folder that can be written");
+      }
+    }
+    ~Parts() {
+      std::error_code ignored;
+      for (const fs::path& part : {pictures, metadata, complete}) fs::remove(part, ignored);
+    }
+    Parts(const Parts&) = delete;
+    Parts& operator=(const Parts&) = delete;
 
-  const fs::path file, pictures = file.string() + ".pictures", metadata = file.string() + ".chapters",
-                       complete = file.string() + ".part";
+    const fs::path pictures, metadata, complete;
+  };
+
+  Impl(fs::path to, int width, int height, int rate_Hz)
+      : file(std::move(to)), parts(file), encoder(Encoding(width, height, rate_Hz, parts.pictures)) {}
+
+  const fs::path file;
+  const Parts parts;
   Run encoder;
 };
 
@@ -173,12 +182,13 @@ void VideoFile::Add(const render::Bitmap& picture) { impl_->encoder.Write(pictur
 void VideoFile::Finish(const std::string& title, std::span<const Chapter> chapters, double end_s) {
   Impl& video = *impl_;
   video.encoder.End();
-  WriteMetadata(video.metadata, title, chapters, end_s);
+  WriteMetadata(video.parts.metadata, title, chapters, end_s);
   // The index first, so that a player can begin before it has the whole file.
-  Run({"-i", video.pictures.string(), "-f", "ffmetadata", "-i", video.metadata.string(), "-map", "0", "-map_metadata",
-       "1", "-map_chapters", "1", "-c", "copy", "-movflags", "+faststart", "-f", "mp4", video.complete.string()})
+  Run({"-i", video.parts.pictures.string(), "-f", "ffmetadata", "-i", video.parts.metadata.string(), "-map", "0",
+       "-map_metadata", "1", "-map_chapters", "1", "-c", "copy", "-movflags", "+faststart", "-f", "mp4",
+       video.parts.complete.string()})
       .End();
-  fs::rename(video.complete, video.file);
+  fs::rename(video.parts.complete, video.file);
 }
 
 }  // namespace fulcrum::replay

@@ -95,30 +95,32 @@ std::string Video(const SessionOutcome& outcome) {
   if (video.file.empty()) {
     return video.missing.empty()
                ? std::string()
-               : title + Tag("p", "There is none: " + video.missing + ". Draw it with: fulcrum log video " +
-                                      outcome.recording.string());
+               : title + Tag("p", "There is none: " + video.missing + ". Draw it with: " + video.command);
   }
+  std::string words;
+  for (const std::string& chapter : video.chapters) words += (words.empty() ? "" : " · ") + chapter;
+  if (video.is_part) words += ". The recorder was restarted: this is the part before.";
   std::error_code unknown;
   const bool embed = std::filesystem::file_size(video.file, unknown) <= kMostEmbedded_B && !unknown;
   std::string source = video.file.filename().string();
   if (embed) {
     std::ifstream in(video.file, std::ios::binary);
     source = "data:video/mp4;base64," + Base64Of({std::istreambuf_iterator<char>(in), {}});
+  } else {
+    words += ". The video is too large for this page: " + video.file.string();
   }
-  std::string chapters;
-  for (const std::string& chapter : video.chapters) chapters += (chapters.empty() ? "" : " · ") + chapter;
   return title + "<div class='card'><figure><video controls muted src='" + source +
          "'><track default kind='subtitles' label='events' src='data:text/vtt;base64," + Base64Of(video.subtitles) +
-         "'></video>" + Tag("figcaption", chapters) + "</figure></div>\n";
+         "'></video>" + Tag("figcaption", words) + "</figure></div>\n";
 }
 
-std::string Pictures(const std::filesystem::path& folder, const SessionOutcome& outcome) {
+std::string Pictures(const std::filesystem::path& folder) {
   const std::vector<Frame> frames = FindFrames(folder);
   if (frames.empty()) {
     return Tag("h2", "Pictures") + Tag("p", "No picture was written in this session.");
   }
   std::string html = Tag("h2", "The last picture") + "<div class='card'>" + Picture(frames.back(), 1) + "</div>\n";
-  html += Video(outcome) + Tag("h2", "Over time") + "<div class='sheet'>\n";
+  html += Tag("h2", "Over time") + "<div class='sheet'>\n";
   for (const Frame& frame : Spread(frames, kSheetFrames)) {
     html += Picture(frame, kSheetShrink);
   }
@@ -283,8 +285,8 @@ std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& recor
   html += EscapeHtml(outcome.scene_name + " · " + outcome.session_id) + "</title><style>" + kStyle;
   html += "</style></head><body><main>\n";
   html += Header(outcome) + Tiles(record) + (outcome.sheet ? SheetHtml(*outcome.sheet, outcome.trainee) : "") +
-          Pictures(frames, outcome) + CutMap(outcome.cut_map) + Plots(outcome, record) + Nodes(outcome, record) +
-          Faults(outcome) + Restarts(record) + Refusals(record) + Events(record);
+          Video(outcome) + Pictures(frames) + CutMap(outcome.cut_map) + Plots(outcome, record) +
+          Nodes(outcome, record) + Faults(outcome) + Restarts(record) + Refusals(record) + Events(record);
   if (!outcome.recording.empty()) {
     html += Tag("h2", "Recording") + Tag("p", "All topics: " + outcome.recording.string() + ", " +
                                                   RecordingLosses(record) + " (details: fulcrum log info).");

@@ -57,18 +57,22 @@ std::string JoinRecordings(const SessionSetup& setup) {
   return done.empty() ? done : done + "\n";
 }
 
-/// The video of a recorded session with pictures.
-SessionVideo VideoOf(const SessionSetup& setup, const Wait& wait) {
-  const bool drawn = (setup.scene.view().node_mask >> static_cast<unsigned>(NodeId::kRender) & 1u) != 0;
-  if (setup.recording.empty() || !setup.settings.video || !drawn) return {};
-  wait.say("drawing the video of the session; Ctrl-C leaves it out");
-  return MakeVideo({.replayer = setup.settings.programs / "replayer",
-                    .recording = setup.recording,
-                    .scene = setup.settings.scene,
-                    .video = setup.folder.path / "video.mp4",
-                    .log = setup.folder.logs / "video.log"},
-                   wait.goes_on);
+void WriteReport(const SessionSetup& setup, const SessionRecord& record, SessionOutcome* outcome, Verdict* verdict) {
+  const SessionFolder& folder = setup.folder;
+  // Written again when one of them cannot be written, so that the other one says so.
+  std::size_t known = 0;
+  do {
+    known = verdict->faults().size();
+    SetVerdict(*verdict, outcome);
+    const double reached_s = outcome->duration_s;
+    Try(reached_s, verdict,
+        [&] { WriteFile(folder.path / "report.html", ReportHtml(*outcome, record, folder.frames)); });
+    Try(reached_s, verdict, [&] { WriteFile(folder.path / "summary.json", SummaryJson(*outcome, record)); });
+  } while (verdict->faults().size() != known);
 }
+
+/// A path as a word of a shell.
+std::string Quoted(const std::filesystem::path& path) { return "'" + path.string() + "'"; }
 
 }  // namespace
 
@@ -94,12 +98,12 @@ void Judge(const SessionSetup& setup, const SessionNodes& nodes, const SessionRe
   if (const std::string missing = MissingFrom(record, demands); !missing.empty()) fail(missing);
 }
 
-std::string WriteResults(SessionSetup* setup, const SessionRecord& record, double reached_s,
-                         const std::optional<ScoreSheet>& sheet, Verdict* verdict, const Wait& wait) {
+SessionResults WriteResults(SessionSetup* setup, const SessionRecord& record, double reached_s,
+                            const std::optional<ScoreSheet>& sheet, Verdict* verdict) {
   const SessionFolder& folder = setup->folder;
-  SessionOutcome outcome = OutcomeOf(*setup, reached_s);
+  SessionResults results{OutcomeOf(*setup, reached_s), {}};
+  SessionOutcome& outcome = results.outcome;
   outcome.sheet = sheet;
-  const std::filesystem::path report = folder.path / "report.html";
   if (sheet) {
     Try(reached_s, verdict, [&] {
       WriteFile(folder.path / "assessment.json",
@@ -114,16 +118,33 @@ std::string WriteResults(SessionSetup* setup, const SessionRecord& record, doubl
   std::string joined;
   Try(reached_s, verdict, [&] { joined = JoinRecordings(*setup); });
   Try(reached_s, verdict, [&] { outcome.cut_map = WriteCutMap(setup->recording, setup->scene.view(), folder.path); });
-  Try(reached_s, verdict, [&] { outcome.video = VideoOf(*setup, wait); });
-  // Written again when one of them cannot be written, so that the other one says so.
-  std::size_t known = 0;
-  do {
-    known = verdict->faults().size();
-    SetVerdict(*verdict, &outcome);
-    Try(reached_s, verdict, [&] { WriteFile(report, ReportHtml(outcome, record, folder.frames)); });
-    Try(reached_s, verdict, [&] { WriteFile(folder.path / "summary.json", SummaryJson(outcome, record)); });
-  } while (verdict->faults().size() != known);
-  return "\n" + FinalTable(outcome, record) + joined + "report: " + report.string();
+  WriteReport(*setup, record, &outcome, verdict);
+  results.text = "\n" + FinalTable(outcome, record) + joined + "report: " + (folder.path / "report.html").string();
+  return results;
+}
+
+bool HasVideo(const SessionSetup& setup) {
+  const bool drawn = (setup.scene.view().node_mask >> static_cast<unsigned>(NodeId::kRender) & 1u) != 0;
+  return !setup.recording.empty() && setup.settings.video && drawn;
+}
+
+std::string AddVideo(const SessionSetup& setup, const SessionRecord& record, const std::function<bool()>& goes_on,
+                     SessionResults* results, Verdict* verdict) {
+  SessionVideo& video = results->outcome.video;
+  const std::filesystem::path scene = setup.folder.path / "scene.fulcrum";
+  video = MakeVideo({.replayer = setup.settings.programs / "replayer",
+                     .recording = setup.recording,
+                     .scene = setup.settings.scene,
+                     .video = setup.folder.path / "video.mp4",
+                     .log = setup.folder.logs / "video.log"},
+                    goes_on);
+  video.command = "fulcrum log video " + Quoted(setup.recording) + " --scene " + Quoted(scene);
+  // A file that a restarted recorder has begun, and that was not joined.
+  std::filesystem::path second = setup.recording;
+  second.replace_filename(second.stem().string() + "-2" + second.extension().string());
+  video.is_part = std::filesystem::exists(second);
+  WriteReport(setup, record, &results->outcome, verdict);
+  return video.file.empty() ? "no video: " + video.missing : "video: " + video.file.string();
 }
 
 }  // namespace fulcrum::supervisor

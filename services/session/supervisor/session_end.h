@@ -21,18 +21,23 @@ namespace fulcrum::supervisor {
 void Judge(const SessionSetup& setup, const SessionNodes& nodes, const SessionRecord& record, double reached_s,
            Verdict* verdict);
 
-struct Wait {
-  std::function<void(const std::string&)> say;  ///< Prints a line.
-  /// Called every few milliseconds; false leaves the video out.
-  std::function<bool()> goes_on;
+struct SessionResults {
+  SessionOutcome outcome;
+  std::string text;  ///< Table, verdict and path of the report, for the terminal.
 };
 
-/// Writes assessment.json, the row of the trainees' database, summary.json, the cut map, the video and report.html.
+/// Writes assessment.json, the row of the trainees' database, summary.json, the cut map and report.html.
 /// @param sheet score sheet of an assessed session.
 /// @param verdict is failed when a file or the row cannot be written; the files then say so, as far as they can be.
-/// @param wait what happens while the video is drawn.
-/// @return table, verdict and path of the report, for the terminal.
-[[nodiscard]] std::string WriteResults(SessionSetup* setup, const SessionRecord& record, double reached_s,
-                                       const std::optional<ScoreSheet>& sheet, Verdict* verdict, const Wait& wait);
+[[nodiscard]] SessionResults WriteResults(SessionSetup* setup, const SessionRecord& record, double reached_s,
+                                          const std::optional<ScoreSheet>& sheet, Verdict* verdict);
+
+/// Whether the session gets a video: it was recorded and has pictures.
+[[nodiscard]] bool HasVideo(const SessionSetup& setup);
+
+/// Draws the video and writes the report again, with it. Returns a line for the terminal.
+/// @param goes_on called every few milliseconds; false leaves the video out.
+[[nodiscard]] std::string AddVideo(const SessionSetup& setup, const SessionRecord& record,
+                                   const std::function<bool()>& goes_on, SessionResults* results, Verdict* verdict);
 
 }  // namespace fulcrum::supervisor

@@ -47,7 +47,7 @@ struct SessionSetup {
   const double end_s;                      ///< Session time of the end [s]; 0: until stopped.
   const std::string keys_warning;          ///< One line on keys that expire soon; empty: none.
   const std::vector<std::string> notices;  ///< What the operator must know of this session, one line each.
-  const DomainGuard guard;
+  std::optional<DomainGuard> guard;        ///< Given back when the session is over, before its video is drawn.
   /// Directory on /dev/shm. Opened right after the guard: commands that find a session read its security settings
   /// there.
   const SessionMemory opened;

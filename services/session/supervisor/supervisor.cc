@@ -63,7 +63,7 @@ struct Supervisor::Impl {
     events = participant->MakeInput<ThermalEvent>();
     orders.emplace(setup.memory);
     dumps.emplace(up.keep_s, setup.folder.path, &*orders);
-    desk.emplace(setup.memory, setup.guard, up.cart.security.group, Verbs());
+    desk.emplace(setup.memory, *setup.guard, up.cart.security.group, Verbs());
     if (!setup.remote_ids.empty()) remote.emplace(setup, &*participant);
     if (setup.scene.view().assessment.on != 0) assessed.emplace(setup.scene.view(), &*participant);
     verdict.Begin(VerdictSession(setup));
@@ -318,15 +318,18 @@ struct Supervisor::Impl {
     Judge(setup, *nodes, record, clock.reached_s(), &verdict);
     SayFaults();
     const auto sheet = assessed ? std::optional(assessed->Finish()) : std::nullopt;
-    const Wait wait{.say = [this](const std::string& line) { status.Say(line); },
-                    .goes_on =
-                        [this, signals = runtime::StopSignals()] {
-                          status.Update(runtime::MonotonicNs());
-                          return runtime::StopSignals() == signals;
-                        }};
-    const std::string results = WriteResults(&setup, record, clock.reached_s(), sheet, &verdict, wait);
+    SessionResults results = WriteResults(&setup, record, clock.reached_s(), sheet, &verdict);
     SayFaults();  // Of files that could not be written.
-    status.Say(results);
+    status.Say(results.text);
+    if (!HasVideo(setup)) return;
+    setup.guard.reset();  // The next session may begin.
+    status.Say("drawing the video of the session; Ctrl-C leaves it out");
+    const auto goes_on = [this, signals = runtime::StopSignals()] {
+      status.Update(runtime::MonotonicNs());
+      return runtime::StopSignals() == signals;
+    };
+    status.Say(AddVideo(setup, record, goes_on, &results, &verdict));
+    SayFaults();
   }
 
   SessionSetup setup;

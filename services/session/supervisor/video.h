@@ -18,6 +18,8 @@ struct VideoOrder {
 
 struct SessionVideo {
   std::filesystem::path file = {};         ///< Empty: there is none.
+  std::string command = {};                ///< That draws it again.
+  bool is_part = false;                    ///< Of a session whose recorder was restarted: up to the restart.
   std::string missing = {};                ///< Then: why, one line.
   std::vector<std::string> chapters = {};  ///< "0:12 cut at 35 W", in the order of time.
   std::string subtitles = {};              ///< The chapters as WebVTT.

@@ -158,6 +158,14 @@ TEST(Video, SaysWhyThereIsNone) {
     EXPECT_NE(run.Said().find(words), std::string::npos) << run.Said();
   };
   expect(2, {"--video", session.folder() / "missing" / "video.mp4"}, "cannot write");
+  {
+    const std::string path = std::getenv("PATH");
+    ::setenv("PATH", session.folder().c_str(), 1);
+    const auto files = Files(session.folder());
+    expect(2, {"--video", session.folder() / "video.mp4"}, "ffmpeg is not installed");
+    ::setenv("PATH", path.c_str(), 1);
+    EXPECT_EQ(Files(session.folder()), files) << "nothing remains";
+  }
   expect(2, {"--video", "video.mp4", "--within", "-1"}, "--within");
   expect(2, {"--video", "video.mp4", "--film"}, "give one of");
 }

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
+#include <optional>
 
 namespace fulcrum::replay {
 namespace {
@@ -64,24 +64,50 @@ TEST_F(ChaptersTest, BeginWithAWarningAndWithAnInjury) {
   ExpectChapters({{0, "start"}, {2, "heat near the ureter"}, {6.5, "ureter injured"}, {13, "heat near the nerve"}});
 }
 
+TEST_F(ChaptersTest, APedalBeforeTheSessionBeginsWithIt) {
+  Pedals(-0.15, 1, kPedalCut);
+  ExpectChapters({{0, "start"}, {0, "cut at 35 W"}});
+}
+
 TEST(PeriodToFinish, IsThatOfTheVideoWhileThereIsTime) {
-  EXPECT_DOUBLE_EQ(PeriodToFinish({.used_s = 2, .reading_s = 0.4, .looks = 60, .at_s = 2, .end_s = 20}, 60), 1.0 / 30);
+  const auto period_s = PeriodToFinish({.used_s = 2, .reading_s = 0.4, .looks = 60, .at_s = 2, .end_s = 20}, 60);
+  EXPECT_DOUBLE_EQ(period_s.value(), 1.0 / 30);
 }
 
-TEST(PeriodToFinish, GrowsUntilTheRestFits) {
-  // Five minutes of a session, of which a second takes 0.05 s to read and 30 * 0.03 s to draw; a minute is left.
-  const VideoWork work{.used_s = 9.5, .reading_s = 0.5, .looks = 300, .at_s = 10, .end_s = 310};
-  const double period_s = PeriodToFinish(work, 69.5);
-  EXPECT_NEAR(300 * 0.05 + 300 / period_s * 0.03, 60, 1e-9);
+/// Time that a video takes whose pictures cost more from its middle on [s]; none: it is given up.
+std::optional<double> TimeOf(double end_s, double each_s, double later_each_s, double within_s) {
+  constexpr double kReading = 0.05;  // Of the session's time.
+  VideoWork work{.end_s = end_s};
+  for (double next_s = 0; next_s <= end_s;) {
+    work.reading_s += kReading * (next_s - work.at_s);
+    work.used_s += kReading * (next_s - work.at_s) + (next_s < end_s / 2 ? each_s : later_each_s);
+    work.at_s = next_s;
+    ++work.looks;
+    const auto period_s = PeriodToFinish(work, within_s);
+    if (!period_s) return std::nullopt;
+    next_s += *period_s;
+  }
+  return work.used_s;
 }
 
-TEST(PeriodToFinish, IsInfiniteWhenReadingAloneTakesLonger) {
-  EXPECT_TRUE(std::isinf(PeriodToFinish({.used_s = 5, .reading_s = 4, .looks = 30, .at_s = 10, .end_s = 1000}, 60)));
+TEST(PeriodToFinish, IsReadyInTimeAlsoWhenLaterPicturesCostMore) {
+  for (const double end_s : {50.0, 120.0, 300.0, 600.0}) {
+    for (const double later : {1.0, 1.5}) {
+      const auto time_s = TimeOf(end_s, 0.035, later * 0.035, 60);
+      ASSERT_TRUE(time_s.has_value()) << end_s << " " << later;
+      EXPECT_LT(*time_s, 60) << end_s << " " << later;
+      EXPECT_GT(*time_s, 40) << "few pictures although there was time: " << end_s << " " << later;
+    }
+  }
 }
 
-TEST(PeriodToFinish, IsThatOfTheVideoAtItsBeginAndEnd) {
-  EXPECT_DOUBLE_EQ(PeriodToFinish({}, 60), 1.0 / 30);
-  EXPECT_DOUBLE_EQ(PeriodToFinish({.used_s = 70, .reading_s = 1, .looks = 9, .at_s = 20, .end_s = 20}, 60), 1.0 / 30);
+TEST(PeriodToFinish, GivesUpWhenReadingAloneTakesLonger) {
+  EXPECT_EQ(TimeOf(2000, 0.035, 0.035, 60), std::nullopt);
+  EXPECT_EQ(PeriodToFinish({.used_s = 5, .reading_s = 4, .looks = 30, .at_s = 10, .end_s = 1000}, 60), std::nullopt);
+}
+
+TEST(PeriodToFinish, DoesNotGiveUpAtTheEnd) {
+  EXPECT_TRUE(PeriodToFinish({.used_s = 70, .reading_s = 1, .looks = 9, .at_s = 20, .end_s = 20}, 60).has_value());
 }
 
 }  // namespace

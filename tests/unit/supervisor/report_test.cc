@@ -338,5 +338,22 @@ TEST(ReportTest, HoldsEverythingAndNothingFromElsewhere) {
   }
 }
 
+TEST(ReportTest, HasItsVideoOrSaysWhyNotAlsoWithoutPictures) {
+  const TemporaryFolder folder;
+  SessionOutcome outcome;
+  outcome.recording = "/elsewhere/it's.mcap";
+  outcome.video = {.command = "fulcrum log video 'x'", .missing = "ffmpeg <is> not installed"};
+  std::string html = ReportHtml(outcome, {}, folder.path() / "no frames");
+  EXPECT_NE(html.find("ffmpeg &lt;is&gt; not installed. Draw it with: fulcrum log video"), std::string::npos);
+  std::ofstream(folder.path() / "video.mp4") << "a clip";
+  outcome.video = {.file = folder.path() / "video.mp4", .is_part = true};
+  html = ReportHtml(outcome, {}, folder.path() / "no frames");
+  EXPECT_NE(html.find("data:video/mp4;base64,"), std::string::npos);
+  EXPECT_NE(html.find("The recorder was restarted"), std::string::npos);
+  fs::resize_file(folder.path() / "video.mp4", 40'000'000);
+  html = ReportHtml(outcome, {}, folder.path() / "no frames");
+  EXPECT_NE(html.find("src='video.mp4'"), std::string::npos) << "too large to embed";
+}
+
 }  // namespace
 }  // namespace fulcrum::supervisor

@@ -166,11 +166,13 @@ WorkingIn::~WorkingIn() {
 }
 
 SweepResult SweepSharedMemory(const fs::path& directory) {
-  const auto live = LiveProcesses();
   const Claims claims = ClaimsIn(directory);
+  // Looked up after the files: a process that begins in between would have files and count as dead.
+  std::optional<std::bitset<65536>> live;
   return RemoveEntries(directory, [&](const std::string& name) {
+    if (!live) live = LiveProcesses();
     const auto owner = OwnerOf(name, claims);
-    return owner && !live.test(*owner);
+    return owner && !live->test(*owner);
   });
 }
 
