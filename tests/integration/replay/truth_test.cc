@@ -221,6 +221,32 @@ TEST_F(TruthTest, FlowLeadsToTheSameTissue) {
   EXPECT_LT(worst_px, 0.1);
 }
 
+TEST_F(TruthTest, OfTissueThatIsCutMeanwhileThereIsNoFlow) {
+  Show(8);
+  const Truth before = TruthNow();
+  Show(14);
+  const Truth after = TruthNow();
+  Channel flow = before.FlowTo(after), classes = after.Classes();
+  int none = 0;
+  for (int y = 0; y < flow.height; ++y) {
+    for (int x = 0; x < flow.width; ++x) {
+      const Hit& hit = before.raster().At(x, flow.height - 1 - y);
+      if (before.ClassOf(hit) != TruthClass::kMembrane) continue;
+      const auto state = static_cast<FlowState>(flow.At(x, y, 2));
+      none += state == FlowState::kNone ? 1 : 0;
+      if (state == FlowState::kNone) {
+        EXPECT_EQ(flow.At(x, y, 0), 0);
+      }
+      if (state != FlowState::kVisible) continue;
+      const int u = static_cast<int>(std::floor(x + 0.5 + kFlowUnit_px * (flow.At(x, y, 0) - 32768.0)));
+      const int v = static_cast<int>(std::floor(y + 0.5 + kFlowUnit_px * (flow.At(x, y, 1) - 32768.0)));
+      ASSERT_TRUE(u >= 0 && v >= 0 && u < flow.width && v < flow.height);
+      EXPECT_EQ(classes.At(u, v), static_cast<int>(TruthClass::kMembrane)) << x << " " << y;
+    }
+  }
+  EXPECT_GT(none, 30) << "the slit has become longer";
+}
+
 TEST_F(TruthTest, WhatAnInstrumentCoversNextIsHidden) {
   Show(6);
   const Truth before = TruthNow();
