@@ -34,7 +34,7 @@ T Between(const std::vector<T>& corners, const Triangle& triangle, const Hit& hi
 }
 
 std::uint16_t Rounded(double value, double most) {
-  return static_cast<std::uint16_t>(std::clamp(value, 0.0, most) + 0.5);
+  return static_cast<std::uint16_t>(std::floor(std::clamp(value, 0.0, most) + 0.5));
 }
 
 TruthClass ClassOfSurface(const DrawnSurface& surface, const std::array<ToolKind, kMaxTools>& kinds) {

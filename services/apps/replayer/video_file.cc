@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 using Words = std::vector<std::string>;
 
 fs::path Ffmpeg() {
-  const fs::path program = runtime::FindInPath("ffmpeg");
+  fs::path program = runtime::FindInPath("ffmpeg");
   if (program.empty()) throw InputError("ffmpeg is not installed; it makes the video: apt install ffmpeg");
   return program;
 }

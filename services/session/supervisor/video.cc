@@ -3,6 +3,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
@@ -41,7 +42,7 @@ std::string MinutesAndSeconds(double time_s) {
 
 /// "00:00:12.345".
 std::string VttTime(double time_s) {
-  const auto ms = static_cast<long>(1e3 * time_s + 0.5);
+  const long ms = std::lround(1e3 * time_s);
   char text[48];
   std::snprintf(text, sizeof(text), "%02ld:%02ld:%02ld.%03ld", ms / 3'600'000, ms / 60'000 % 60, ms / 1000 % 60,
                 ms % 1000);
