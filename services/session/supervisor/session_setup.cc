@@ -90,6 +90,11 @@ std::filesystem::path RecordingFile(const UpSettings& settings, const SessionFol
 
 SessionMemory::~SessionMemory() { bus::RemoveSharedMemory(path); }
 
+void SessionSetup::FreeDomain() {
+  opened.reset();
+  guard.reset();
+}
+
 SessionSetup::SessionSetup(const UpSettings& up)
     : settings(up),
       scene(up.scene),
@@ -98,7 +103,7 @@ SessionSetup::SessionSetup(const UpSettings& up)
       notices(NoticesOf(up)),
       guard(up.cart.domain),
       opened(OpenMemory(up)),
-      memory(opened.path),
+      memory(opened->path),
       training(OpenTrainingLog(up.trainee, up.training_database, scene.view())),
       folder(MakeSessionFolder(up.out, up.scene, scene, up.cart, RunYaml(up, end_s))),
       recording(RecordingFile(up, folder)),

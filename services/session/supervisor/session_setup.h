@@ -41,6 +41,9 @@ struct SessionSetup {
   /// The script that sets the generator; empty on a cart with a real pedal, where a person operates it.
   [[nodiscard]] std::span<const ScriptKey> operator_script() const;
   [[nodiscard]] bool has_recorder() const;
+  /// When the session is over: the next one may begin in the domain. Removes the private directory first, which is the
+  /// next session's from then on.
+  void FreeDomain();
 
   const UpSettings settings;
   const scene::SceneFile scene;
@@ -50,8 +53,8 @@ struct SessionSetup {
   std::optional<DomainGuard> guard;        ///< Given back when the session is over, before its video is drawn.
   /// Directory on /dev/shm. Opened right after the guard: commands that find a session read its security settings
   /// there.
-  const SessionMemory opened;
-  const std::filesystem::path& memory;
+  std::optional<SessionMemory> opened;
+  const std::filesystem::path memory;
   std::optional<TrainingLog> training;  ///< Empty: no trainee was named.
   const SessionFolder folder;
   const std::filesystem::path recording;  ///< The recorder's first file; empty: none.

@@ -322,7 +322,7 @@ struct Supervisor::Impl {
     SayFaults();  // Of files that could not be written.
     status.Say(results.text);
     if (!HasVideo(setup)) return;
-    setup.guard.reset();  // The next session may begin.
+    setup.FreeDomain();
     status.Say("drawing the video of the session; Ctrl-C leaves it out");
     const auto goes_on = [this, signals = runtime::StopSignals()] {
       status.Update(runtime::MonotonicNs());

@@ -164,6 +164,17 @@ TEST(RecordedCart, TheReportContainsTheVideo) {
   EXPECT_NE(session.report().find("0:00 start"), std::string::npos) << "its chapters";
 }
 
+TEST(RecordedCart, TheNextSessionNeedNotWaitForTheVideo) {
+  FilmedSession session;
+  ASSERT_TRUE(testing::WaitFor(60, [&] { return session.up().Said().find("drawing the video") != std::string::npos; }))
+      << session.up().Said();
+  Cart next("small", kCartDomain, {"--seconds", "8"});
+  session.ExpectEndsWell();  // While the next one goes on.
+  EXPECT_EQ(Program("fulcrum", {"status", "--domain", std::to_string(kCartDomain)}).End(0), 0);
+  EXPECT_EQ(next.WaitForEnd(60), 0) << next.Said();
+  EXPECT_TRUE(fs::exists(session.video()));
+}
+
 TEST(RecordedCart, CtrlCLeavesTheVideoOut) {
   FilmedSession session;
   ASSERT_TRUE(testing::WaitFor(60, [&] { return session.up().Said().find("drawing the video") != std::string::npos; }))
