@@ -9,6 +9,7 @@
 #include <string>
 
 #include "services/records/log_tools/tools.h"
+#include "services/transport/bus/dds/shared_memory.h"
 #include "services/transport/bus/gate.h"
 #include "tests/support/cart.h"
 #include "tests/support/recorder_probe.h"
@@ -168,9 +169,12 @@ TEST(RecordedCart, TheNextSessionNeedNotWaitForTheVideo) {
   FilmedSession session;
   ASSERT_TRUE(testing::WaitFor(60, [&] { return session.up().Said().find("drawing the video") != std::string::npos; }))
       << session.up().Said();
-  Cart next("small", kCartDomain, {"--seconds", "8"});
+  Cart next("small", kCartDomain, {"--seconds", "300"});
+  ASSERT_TRUE(testing::WaitFor(60, [&] { return next.Said().find(" s · ") != std::string::npos; })) << next.Said();
   session.ExpectEndsWell();  // While the next one goes on.
   EXPECT_EQ(Program("fulcrum", {"status", "--domain", std::to_string(kCartDomain)}).End(0), 0);
+  EXPECT_TRUE(fs::exists(bus::SharedMemoryDirectory(kCartDomain))) << "of the next one";
+  next.Signal(SIGINT);
   EXPECT_EQ(next.WaitForEnd(60), 0) << next.Said();
   EXPECT_TRUE(fs::exists(session.video()));
 }
