@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <osg/Geode>
 #include <osg/Geometry>
 #include <osg/NodeVisitor>
@@ -149,8 +150,10 @@ TEST_F(TruthTest, IsWhatOpenGLDraws) {
        {TruthClass::kNone, TruthClass::kSurroundings, TruthClass::kFat, TruthClass::kMembrane, TruthClass::kGrasper}) {
     const auto k = static_cast<std::size_t>(what);
     EXPECT_GT(either[k], 100) << NameOf(what) << " is in the picture";
-    EXPECT_GE(both[k] / either[k], what == TruthClass::kFat ? 0.9 : 0.98) << NameOf(what);
+    std::printf("iou %s %.4f\n", NameOf(what), both[k] / either[k]);
+    EXPECT_GE(both[k] / either[k], 0.98) << NameOf(what);
   }
+  std::printf("depth_error_mm_max %.4f\n", 1e3 * worst_m);
   EXPECT_LT(worst_m, 1e-4);
 }
 
@@ -218,7 +221,16 @@ TEST_F(TruthTest, FlowLeadsToTheSameTissue) {
   }
   EXPECT_GT(compared, 5000);
   EXPECT_GT(moved, 1) << "something moves";
+  std::printf("flow_error_px_max %.4f of %d pixels\n", worst_px, compared);
   EXPECT_LT(worst_px, 0.1);
+}
+
+/// Pixel to which the flow leads, from the upper left.
+std::pair<int, int> PixelAfter(Channel* flow, int x, int y) {
+  const auto moved = [&](int from, int sample) {
+    return static_cast<int>(std::floor(from + 0.5 + kFlowUnit_px * (flow->At(x, y, sample) - 32768.0)));
+  };
+  return {moved(x, 0), moved(y, 1)};
 }
 
 TEST_F(TruthTest, OfTissueThatIsCutMeanwhileThereIsNoFlow) {
@@ -238,8 +250,7 @@ TEST_F(TruthTest, OfTissueThatIsCutMeanwhileThereIsNoFlow) {
         EXPECT_EQ(flow.At(x, y, 0), 0);
       }
       if (state != FlowState::kVisible) continue;
-      const int u = static_cast<int>(std::floor(x + 0.5 + kFlowUnit_px * (flow.At(x, y, 0) - 32768.0)));
-      const int v = static_cast<int>(std::floor(y + 0.5 + kFlowUnit_px * (flow.At(x, y, 1) - 32768.0)));
+      const auto [u, v] = PixelAfter(&flow, x, y);
       ASSERT_TRUE(u >= 0 && v >= 0 && u < flow.width && v < flow.height);
       EXPECT_EQ(classes.At(u, v), static_cast<int>(TruthClass::kMembrane)) << x << " " << y;
     }
@@ -258,8 +269,7 @@ TEST_F(TruthTest, WhatAnInstrumentCoversNextIsHidden) {
     for (int x = 0; x < flow.width; ++x) {
       if (flow.At(x, y, 2) != static_cast<int>(FlowState::kHidden)) continue;
       ++hidden;
-      const int u = static_cast<int>(std::floor(x + 0.5 + kFlowUnit_px * (flow.At(x, y, 0) - 32768.0)));
-      const int v = static_cast<int>(std::floor(y + 0.5 + kFlowUnit_px * (flow.At(x, y, 1) - 32768.0)));
+      const auto [u, v] = PixelAfter(&flow, x, y);
       if (u < 0 || v < 0 || u >= flow.width || v >= flow.height || classes.At(u, v) == 0) continue;
       const auto what = static_cast<TruthClass>(classes.At(u, v));
       wrong += !IsTool(what) && what == before.ClassOf(before.raster().At(x, flow.height - 1 - y)) ? 1 : 0;
