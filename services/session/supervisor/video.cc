@@ -96,11 +96,12 @@ SessionVideo MakeVideo(const VideoOrder& order, const std::function<bool()>& goe
         {order.recording.string(), "--video", order.video.string(), "--scene", order.scene.string(), "--within",
          std::to_string(kWithin_s), "--json", json.string()},
         order.log);
-    const std::optional<runtime::ProcessEnd> end = Await(&child, goes_on);
+    bool left_out = false;
+    const std::optional<runtime::ProcessEnd> end = Await(&child, [&] { return !(left_out = !goes_on()); });
     if (!end) {
       child = {};  // Killed.
       RemoveParts(order.video);
-      return {.missing = "it was not ready in time, or left out by Ctrl-C"};
+      return {.missing = left_out ? "it was left out" : "it was not ready in time"};
     }
     if (end->signal != 0 || end->exit_code != 0) {
       RemoveParts(order.video);
