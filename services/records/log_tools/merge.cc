@@ -198,7 +198,7 @@ MergeResult Merge(const std::vector<fs::path>& files, const fs::path& out) {
   return result;
 }
 
-std::string JoinSegments(const fs::path& recording, std::uint64_t keep_free_B) {
+JoinResult JoinSegments(const fs::path& recording, std::uint64_t keep_free_B) {
   std::error_code none;
   if (!fs::exists(recording, none)) return {};
   std::vector<fs::path> files{recording};
@@ -224,9 +224,9 @@ std::string JoinSegments(const fs::path& recording, std::uint64_t keep_free_B) {
   const std::string how = "; join them with fulcrum log merge";
   std::uintmax_t size_B = 0;
   for (const fs::path& file : files) size_B += fs::file_size(file, none);
-  if (size_B > kLongestJoin_B) return kept + "they are large" + how;
+  if (size_B > kLongestJoin_B) return {kept + "they are large" + how, false};
   const fs::space_info space = fs::space(fs::absolute(recording).parent_path(), none);
-  if (none || space.available < size_B + keep_free_B) return kept + "the disk has too little room" + how;
+  if (none || space.available < size_B + keep_free_B) return {kept + "the disk has too little room" + how, false};
   fs::path joined = recording;
   joined += ".joining";
   try {
@@ -236,10 +236,10 @@ std::string JoinSegments(const fs::path& recording, std::uint64_t keep_free_B) {
     for (std::size_t i = 1; i < files.size(); ++i) fs::remove(files[i], none);
     std::string text = std::to_string(files.size()) + " files of the recording were joined";
     for (const std::string& note : result.notes) text += "; " + note;
-    return text;
+    return {text};
   } catch (const std::exception& error) {
     fs::remove(joined, none);
-    return kept + error.what();
+    return {kept + error.what(), false};
   }
 }
 

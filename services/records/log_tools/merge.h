@@ -18,9 +18,14 @@ struct MergeResult {
 /// cannot be written.
 [[nodiscard]] MergeResult Merge(const std::vector<std::filesystem::path>& files, const std::filesystem::path& out);
 
+struct JoinResult {
+  std::string said;   ///< What was done, or why nothing was, for people; empty: there is only one file.
+  bool whole = true;  ///< The session is in one file.
+};
+
 /// Joins `recording` with the files that restarted recorders have written beside it (recording-2.mcap …) into one with
-/// its name, and removes these. Returns what was done, or why nothing was, for people; empty: there is only one file.
+/// its name, and removes these.
 /// @param keep_free_B space that stays free on the disk [B].
-[[nodiscard]] std::string JoinSegments(const std::filesystem::path& recording, std::uint64_t keep_free_B);
+[[nodiscard]] JoinResult JoinSegments(const std::filesystem::path& recording, std::uint64_t keep_free_B);
 
 }  // namespace fulcrum::log_tools

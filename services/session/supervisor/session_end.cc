@@ -49,12 +49,11 @@ void Try(double time_s, Verdict* verdict, const Write& write) {
   }
 }
 
-/// Joins the files of a recorder that was restarted. A line for the terminal; empty: there is one file.
-std::string JoinRecordings(const SessionSetup& setup) {
+/// Joins the files of a recorder that was restarted.
+log_tools::JoinResult JoinRecordings(const SessionSetup& setup) {
   if (setup.recording.empty()) return {};
   const auto keep_free_B = static_cast<std::uint64_t>(1e6 * setup.settings.cart.recorder.keep_free_MB);
-  const std::string done = log_tools::JoinSegments(setup.recording, keep_free_B);
-  return done.empty() ? done : done + "\n";
+  return log_tools::JoinSegments(setup.recording, keep_free_B);
 }
 
 void WriteReport(const SessionSetup& setup, const SessionRecord& record, SessionOutcome* outcome, Verdict* verdict) {
@@ -115,11 +114,13 @@ SessionResults WriteResults(SessionSetup* setup, const SessionRecord& record, do
     // Without the row the figures are still in assessment.json.
     Try(reached_s, verdict, [&] { setup->training->Add(TrainingRowOf(outcome)); });
   }
-  std::string joined;
+  log_tools::JoinResult joined;
   Try(reached_s, verdict, [&] { joined = JoinRecordings(*setup); });
+  outcome.video.is_part = !joined.whole;
+  if (!joined.said.empty()) joined.said += "\n";
   Try(reached_s, verdict, [&] { outcome.cut_map = WriteCutMap(setup->recording, setup->scene.view(), folder.path); });
   WriteReport(*setup, record, &outcome, verdict);
-  results.text = "\n" + FinalTable(outcome, record) + joined + "report: " + (folder.path / "report.html").string();
+  results.text = "\n" + FinalTable(outcome, record) + joined.said + "report: " + (folder.path / "report.html").string();
   return results;
 }
 
@@ -131,6 +132,7 @@ bool HasVideo(const SessionSetup& setup) {
 std::string AddVideo(const SessionSetup& setup, const SessionRecord& record, const std::function<bool()>& goes_on,
                      SessionResults* results, Verdict* verdict) {
   SessionVideo& video = results->outcome.video;
+  const bool is_part = video.is_part;
   const std::filesystem::path scene = setup.folder.path / "scene.fulcrum";
   video = MakeVideo({.replayer = setup.settings.programs / "replayer",
                      .recording = setup.recording,
@@ -139,10 +141,7 @@ std::string AddVideo(const SessionSetup& setup, const SessionRecord& record, con
                      .log = setup.folder.logs / "video.log"},
                     goes_on);
   video.command = "fulcrum log video " + Quoted(setup.recording) + " --scene " + Quoted(scene);
-  // A file that a restarted recorder has begun, and that was not joined.
-  std::filesystem::path second = setup.recording;
-  second.replace_filename(second.stem().string() + "-2" + second.extension().string());
-  video.is_part = std::filesystem::exists(second);
+  video.is_part = is_part;
   WriteReport(setup, record, &results->outcome, verdict);
   return video.file.empty() ? "no video: " + video.missing : "video: " + video.file.string();
 }

@@ -144,11 +144,11 @@ TEST_F(Merging, RefusesOtherSessionsAndScenesAndReplacesNothing) {
 
 TEST_F(Merging, SegmentsOfASessionBecomeItsRecording) {
   const fs::path file = Record("recording.mcap", 1, 1000);
-  EXPECT_EQ(JoinSegments(file, 0), "") << "one file";
+  EXPECT_EQ(JoinSegments(file, 0).said, "") << "one file";
   Record("recording-2.mcap", 1001, 2000);
   Record("recording-3.mcap", 1, 10, "another session");
   Record("recording-4.mcap", 2001, 3000);
-  EXPECT_EQ(JoinSegments(file, 0), "3 files of the recording were joined");
+  EXPECT_EQ(JoinSegments(file, 0).said, "3 files of the recording were joined");
   EXPECT_EQ(Read(file).sequences.at("fulcrum/ToolState"), Range(1, 3000));
   EXPECT_FALSE(fs::exists(folder_ / "recording-2.mcap"));
   EXPECT_FALSE(fs::exists(folder_ / "recording-4.mcap"));
@@ -158,7 +158,9 @@ TEST_F(Merging, SegmentsOfASessionBecomeItsRecording) {
 TEST_F(Merging, SegmentsStayWhereTheDiskHasNoRoom) {
   const fs::path file = Record("recording.mcap", 1, 10);
   Record("recording-2.mcap", 11, 20);
-  const std::string told = JoinSegments(file, std::uint64_t{1} << 60);
+  const JoinResult result = JoinSegments(file, std::uint64_t{1} << 60);
+  EXPECT_FALSE(result.whole);
+  const std::string told = result.said;
   EXPECT_NE(told.find("too little room; join them with fulcrum log merge"), std::string::npos) << told;
   EXPECT_TRUE(fs::exists(folder_ / "recording-2.mcap"));
 }
