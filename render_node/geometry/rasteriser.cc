@@ -6,8 +6,6 @@
 namespace fulcrum::render {
 namespace {
 
-constexpr double kNear_m = 0.004;  // As in laparoscope.cc.
-
 struct Range {
   int begin, end;  // Half open.
 };
@@ -58,11 +56,11 @@ void Rasteriser::AddTriangle(std::int32_t surface, std::uint32_t index, const Ei
                           camera_.focal * corners(1, k) + camera_.centre_y * w, w);
   }
   const auto w = pixels.row(2);
-  if (w.maxCoeff() < kNear_m) return;
+  if (w.maxCoeff() < camera_.near_m) return;
   const double turn = pixels.determinant();
   if (turn == 0 || (options.cull_back && turn < 0)) return;
   Vec2d low(0, 0), high(camera_.width, camera_.height);
-  if (w.minCoeff() >= kNear_m) {
+  if (w.minCoeff() >= camera_.near_m) {
     const Eigen::Matrix<double, 2, 3> places = pixels.topRows<2>().array().rowwise() / w.array();
     low = places.rowwise().minCoeff();
     high = places.rowwise().maxCoeff();
@@ -89,7 +87,7 @@ void Rasteriser::AddTriangle(std::int32_t surface, std::uint32_t index, const Ei
       const double sum = over_depth.sum();
       if (sum <= 0) continue;
       const double depth = 1 / sum;
-      if (depth < kNear_m) continue;
+      if (depth < camera_.near_m) continue;
       const std::size_t pixel =
           static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width) + static_cast<std::size_t>(x);
       if (depth >= order_[pixel]) continue;

@@ -18,6 +18,7 @@ struct Pinhole {
   double focal = 1;                                         ///< [pixels]
   double centre_x = 0, centre_y = 0;                        ///< [pixels]
   double radius = std::numeric_limits<double>::infinity();  ///< Of the round field [pixels].
+  double near_m = 0.004;                                    ///< What is nearer is not drawn.
 
   /// Place [pixels] of a point of the camera frame that lies ahead.
   [[nodiscard]] Vec2d Project(const Vec3d& p) const {

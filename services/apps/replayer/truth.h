@@ -61,7 +61,6 @@ class Truth {
   explicit Truth(Moment moment);
 
   [[nodiscard]] const render::Pinhole& camera() const { return raster_.camera(); }
-  [[nodiscard]] const std::vector<render::DrawnSurface>& surfaces() const { return surfaces_; }
   [[nodiscard]] const render::Rasteriser& raster() const { return raster_; }
   /// Place in the picture [pixels, from the lower left], and depth [m].
   [[nodiscard]] std::pair<Vec2d, double> PlaceOf(const Vec3d& p_W) const;
@@ -96,7 +95,7 @@ class Truth {
   [[nodiscard]] std::optional<Corner> CoordinateOf(const render::Hit& hit) const;
   /// Unit normal of the triangle, frame W, on either side.
   [[nodiscard]] Vec3d NormalOf(const render::Hit& hit) const;
-  /// Size of the pixel on its surface, where that is flattest [m].
+  /// Longest extent of the pixel on its surface, at most ten times that on a surface that faces the camera [m].
   [[nodiscard]] double Footprint(const render::Hit& hit) const;
   /// Whether a point that comes to this place and depth is visible here. @param material of a sheet.
   [[nodiscard]] FlowState StateOf(const Vec2d& place, double depth_m, const render::DrawnSurface* surface,

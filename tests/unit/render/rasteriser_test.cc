@@ -91,6 +91,21 @@ TEST(Rasteriser, HidesWhatIsTurnedAwayIsBehindOrIsNotShown) {
   EXPECT_FLOAT_EQ(raster.At(32, 24).depth_m, 0.101f);
 }
 
+TEST(Rasteriser, HasTheCameraOfThePicture) {
+  RenderParams params;
+  params.width = 96;
+  params.height = 54;
+  const Laparoscope scope = MakeLaparoscope(params);
+  const Pinhole camera = PinholeOf(scope, 192, 108);  // Of a picture with twice as many lines.
+  EXPECT_NEAR(camera.near_m, 0.004, 1e-8);
+  EXPECT_NEAR(camera.radius, 2 * static_cast<double>(scope.circle_radius), 1e-4);
+  const Vec3f p(0.01f, -0.02f, -0.1f);
+  const Vec3f clip = (scope.projection * p.homogeneous()).hnormalized();
+  const Vec2d place = camera.Project(p.cast<double>());
+  EXPECT_NEAR(place.x(), 96 * (1 + static_cast<double>(clip.x())), 1e-3);
+  EXPECT_NEAR(place.y(), 54 * (1 + static_cast<double>(clip.y())), 1e-3);
+}
+
 TEST(Rasteriser, TakesNoHarmFromInvalidTriangles) {
   Rasteriser raster(kCamera);
   const double nan = std::numeric_limits<double>::quiet_NaN();
