@@ -140,6 +140,19 @@ std::optional<std::array<std::uint8_t, 4>> Atlas::At(const Vec2f& material) cons
   return texel;
 }
 
+bool Atlas::Removed(const Vec2f& material) const {
+  const Vec2f place = (material / texel_m_).array() - 0.5f;  // The centre of texel 0 is at 0.
+  const auto x = static_cast<int>(std::floor(place.x())), y = static_cast<int>(std::floor(place.y()));
+  const float right = place.x() - static_cast<float>(x), up = place.y() - static_cast<float>(y);
+  const auto alpha = [&](int column, int row) {
+    return static_cast<float>(
+        texels_[4 * TexelIndex(std::clamp(column, 0, width_ - 1), std::clamp(row, 0, height_ - 1), width_) + 3]);
+  };
+  const float low = (1 - right) * alpha(x, y) + right * alpha(x + 1, y);
+  const float high = (1 - right) * alpha(x, y + 1) + right * alpha(x + 1, y + 1);
+  return (1 - up) * low + up * high < 127.5f;
+}
+
 void Atlas::Touch(const AtlasRect& rect) {
   for (int y = rect.y; y < rect.y + rect.height; ++y) {
     for (int x = rect.x; x < rect.x + rect.width; ++x) {

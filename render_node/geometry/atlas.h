@@ -42,6 +42,9 @@ class Atlas {
   /// Texel at (s, t) [m]; no value outside the sheet.
   [[nodiscard]] std::optional<std::array<std::uint8_t, 4>> At(const Vec2f& material) const;
 
+  /// Whether the sheet is shown as removed at (s, t) [m]: the border lies between texels, as in the shaders.
+  [[nodiscard]] bool Removed(const Vec2f& material) const;
+
   /// True if tissue has been damaged or cut in the block of 16 x 16 texels at (s, t) [m].
   [[nodiscard]] bool Touched(const Vec2f& material) const;
   /// Number of blocks for which Touched() has become true.

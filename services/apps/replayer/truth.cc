@@ -13,7 +13,6 @@ using render::Hit;
 /// What is farther behind the nearest surface than this is hidden [m]; the surface of a neighbouring pixel that is seen
 /// at a flat angle is that much nearer.
 constexpr double kHidden_m = 0.0005, kHiddenBySelf_m = 0.002;
-constexpr std::uint8_t kIntact = 128;  // Of the atlas' fourth byte.
 
 std::string KeyOf(const DrawnSurface& surface) {
   return surface.name + " " + std::to_string(surface.tool) + " " + std::to_string(surface.part);
@@ -89,10 +88,7 @@ void Truth::Draw(const render::Atlas& atlas) {
     positions.clear();
     for (const Vec3d& p_W : surface.positions_W) positions.push_back(turn * p_W + place);
     render::RasterOptions options{.behind_m = surface.behind_m, .cull_back = surface.cull_back};
-    const auto removed = [&atlas](const Corner& at) {
-      const auto texel = atlas.At({at[0], at[1]});
-      return texel && (*texel)[3] < kIntact;
-    };
+    const auto removed = [&atlas](const Corner& at) { return atlas.Removed({at[0], at[1]}); };
     const auto at = [&surface](std::uint32_t triangle, float b1, float b2) {
       return Between(surface.coordinates, surface.triangles[triangle], {0, triangle, b1, b2, 0});
     };
