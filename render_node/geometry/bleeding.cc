@@ -16,13 +16,13 @@ constexpr int kRim = 16;        // Number of points around a cut that are checke
 constexpr float kRimRadii[] = {0.0005f, 0.0008f};  // [m]
 constexpr float kVessel = 0.5f;
 constexpr std::uint8_t kSealed = 128;
-constexpr float kRun_m = 0.032f;
+constexpr float kRun_m = 0.024f;
 constexpr float kSpeed_m_s = 0.009f;  // On a vertical wall.
 constexpr float kLeastSlope = 0.15f;  // Lower limit of the slope: a film also creeps on a horizontal surface.
 constexpr float kSameVessel_m = 0.006f;
 constexpr float kPool_m = 0.0024f;  // Radius at the source.
 constexpr float kDrop_m = 0.0016f;  // Radius of a full drop.
-constexpr float kStray = 0.6f;      // [rad]
+constexpr float kStray = 0.4f;      // [rad]
 constexpr float kThick = 1.0f, kThin = 0.6f;
 
 }  // namespace

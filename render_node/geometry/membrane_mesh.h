@@ -37,6 +37,11 @@ class MembraneMesh {
   [[nodiscard]] std::span<const Vec2f> materials() const { return materials_; }  ///< (s, t) [m].
   [[nodiscard]] std::span<const float> sides() const { return sides_; }
   [[nodiscard]] std::span<const Triangle> triangles() const { return triangles_; }
+  /// Node of the grid at whose place on the sheet a vertex lies.
+  [[nodiscard]] Index NodeOf(Index vertex) const {
+    const Index nodes = scene_.membrane.node_count();
+    return vertex < nodes ? vertex : parts_[(vertex - nodes) / 3].nodes[(vertex - nodes) % 3];
+  }
   /// Number of intact triangles; parts of cut ones follow them in triangles().
   [[nodiscard]] std::size_t whole_triangles() const { return whole_triangles_; }
 

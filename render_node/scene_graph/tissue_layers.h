@@ -55,6 +55,8 @@ class TissueLayers {
   void UpdateRectum();
   void UpdateMembrane();
   void UpdateFat();
+  /// Sets rim_: 1 at the rim of a sheet that the retroperitoneum continues, 0 from 8 mm inside on.
+  void FindRim();
 
   SceneView scene_;
   FieldOfView field_;
@@ -69,6 +71,7 @@ class TissueLayers {
   std::vector<Triangle> fat_shown_;
   std::vector<float> fat_bared_;
   std::vector<Triangle> chosen_;  // Scratch: triangles of the membrane at the level of detail that is needed.
+  std::vector<float> rim_;  // Per node of the membrane's grid.
   bool tissue_changed_ = true, topology_changed_ = true, scope_changed_ = true;
   osg::ref_ptr<osg::Geode> geode_ = new osg::Geode;
   Layer rectum_, fat_layer_, sheet_;

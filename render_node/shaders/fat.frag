@@ -4,7 +4,6 @@ in vec3 position;
 in vec3 normal;
 in vec4 coordinate;
 uniform sampler2D noise_pattern;
-uniform sampler2D atlas;
 uniform sampler2D structures;
 uniform vec2 atlas_per_metre;  // Atlas coordinates per metre of material.
 out vec4 fragment;
@@ -19,7 +18,7 @@ void main() {
   vec3 bend = noise.rgb - 0.5;
   float lobule = noise.a;
   vec3 n = normalize(normal + 0.45 * bend);
-  vec3 albedo = mix(vec3(0.60, 0.25, 0.08), vec3(0.86, 0.52, 0.13), lobule * (0.55 + 0.75 * broad.b));
+  vec3 albedo = mix(vec3(0.50, 0.18, 0.08), vec3(0.91, 0.59, 0.19), lobule * (0.55 + 0.75 * broad.b));
   // A ureter is a pale pink cord, a nerve a thin white one.
   float cord = smoothstep(0.35, 0.65, structure.r);
   float nerve = smoothstep(0.40, 0.70, structure.g);
@@ -30,17 +29,16 @@ void main() {
   // The border of bared fat follows the lobules, not a straight line.
   float bared = smoothstep(0.30, 0.75, coordinate.w + 0.7 * (lobule - 0.5) + 1.2 * (broad.g - 0.5));
   float opened = max(heat.a < 0.5 ? 1.0 : 0.0, bared * smoothstep(0.0, 0.35, coordinate.w));
-  float alpha = (0.45 + 0.45 * lobule) * cover;
-  alpha = max(alpha, (0.62 + 0.30 * lobule) * opened);
+  float alpha = (0.30 + 0.25 * lobule) * cover; // Beneath intact tissue, which blurs what lies below.
+  alpha = max(alpha, (0.72 + 0.22 * lobule) * opened);
   alpha = clamp(max(alpha, 0.9 * max(cord, nerve)), 0.0, 0.97);
   // Under a burn the fat is seared as well, least in the open middle of the slit.
   float dry = clamp(2.0 * heat.b, 0.0, 1.0);
   albedo *= mix(vec3(1.0), vec3(0.46, 0.27, 0.16), (heat.a < 0.5 ? 0.25 : 0.7) * dry);
-  // Read without interpolation: values between open and closed texels would look like blood.
-  float own = heat.a < 0.5 ? texelFetch(atlas, ivec2(m * atlas_per_metre * vec2(textureSize(atlas, 0))), 0).a : 1.0;
-  float blood = own < 0.5 ? smoothstep(0.12, 0.7, 2.0 * own) : 0.0;
-  albedo = mix(albedo, vec3(0.30, 0.006, 0.008), 0.95 * blood);
-  alpha = mix(alpha, 0.97, blood);
+  float blood = heat.a < 0.75 ? BloodAt(m * atlas_per_metre, 0.0) : 0.0;
+  float bloody = smoothstep(0.15, 0.45, blood);
+  albedo = mix(albedo, BloodColour(blood), bloody);
+  alpha = mix(alpha, 0.97, bloody);
   float gloss;
-  fragment = vec4(ToneMap(ShadeTissue(albedo, vec3(0.35, 0.25, 0.12), n, n, position, 0.6, gloss)), alpha);
+  fragment = vec4(ToneMap(ShadeTissue(albedo, vec3(0.35, 0.25, 0.12), n, n, position, 0.8 + 0.8 * bloody, gloss)), alpha);
 }

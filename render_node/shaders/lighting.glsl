@@ -35,11 +35,31 @@ vec3 ShadeTissue(vec3 albedo, vec3 scatter, vec3 normal, vec3 film, vec3 positio
   float side = sign(dot(normal, v));
   vec3 diffuse = clamp((side * dot(normal, l) + scatter) / (1.0 + scatter), 0.0, 1.0);
   // Light and eye are only 4 mm apart, so the light's direction is used as the half vector.
-  gloss = e * wet * (Highlight(side * dot(film, l), 0.20, 1.6) +
+  gloss = e * wet * (Highlight(side * dot(film, l), 0.14, 1.9) +
                      Highlight(side * dot(film, normalize(wall_direction + v)), 0.07, 0.45));
   // Indirect light from the rest of the cavity is red.
   return e * (albedo * diffuse) + gloss * vec3(1.0, 0.96, 0.92) + albedo * vec3(0.030, 0.014, 0.012);
 }
+
+// Blood is the low bits of the atlas' fourth channel (geometry/atlas.h): interpolated here, because values between
+// closed and open texels would look like blood. closed: 1 counts the blood on closed texels, 0 only that in the slit.
+uniform sampler2D atlas;
+
+float BloodOf(ivec2 texel, float closed) {
+  float own = texelFetch(atlas, clamp(texel, ivec2(0), textureSize(atlas, 0) - 1), 0).a;
+  return own < 0.5 ? 2.0 * own : closed * (2.0 - 2.0 * own);
+}
+
+float BloodAt(vec2 place, float closed) {
+  vec2 at = place * vec2(textureSize(atlas, 0)) - 0.5;
+  ivec2 low = ivec2(floor(at));
+  vec2 part = at - vec2(low);
+  return mix(mix(BloodOf(low, closed), BloodOf(low + ivec2(1, 0), closed), part.x),
+             mix(BloodOf(low + ivec2(0, 1), closed), BloodOf(low + ivec2(1, 1), closed), part.x), part.y);
+}
+
+// A film of blood absorbs more where it is thicker.
+vec3 BloodColour(float thickness) { return mix(vec3(0.46, 0.020, 0.014), vec3(0.22, 0.004, 0.005), thickness); }
 
 // Metal: it reflects the lit cavity, red below and dark towards the scope.
 vec3 ShadeMetal(vec3 tint, vec3 normal, vec3 position) {
@@ -48,9 +68,9 @@ vec3 ShadeMetal(vec3 tint, vec3 normal, vec3 position) {
   vec3 v = normalize(-position);
   vec3 n = dot(normal, v) < 0.0 ? -normal : normal;
   vec3 r = reflect(-v, n);
-  vec3 cavity = mix(vec3(0.30, 0.10, 0.08), vec3(0.05, 0.04, 0.04), smoothstep(-0.4, 0.5, r.z));
+  vec3 cavity = mix(vec3(0.42, 0.17, 0.13), vec3(0.03, 0.025, 0.025), smoothstep(-0.7, 0.35, r.z));
   float nl = max(dot(n, l), 0.0);
-  return e * tint * (0.35 * nl + Highlight(nl, 0.4, 1.5)) + tint * cavity;
+  return tint * (e * (0.10 * nl + Highlight(nl, 0.7, 2.2)) + (0.35 + 0.65 * e) * cavity);
 }
 
 // Tone curve 1 - 1 / (1 + x)^2, gamma of 2, and vignetting towards the rim of the optics.

@@ -3,11 +3,10 @@
 // more than on the present temperature, so burns persist. One triangle draws both layers: the fascia is sampled where
 // the line of sight meets it, and the two are blended here, the nearer one on top. So their order is correct for each
 // pixel, for either side of the sheet and any order of triangles. coordinate: material (s, t) [m], side (see
-// geometry/membrane_mesh.h).
+// geometry/membrane_mesh.h), nearness of a rim that fixed tissue continues.
 in vec3 position;
 in vec3 normal;
 in vec4 coordinate;
-uniform sampler2D atlas;
 uniform sampler2D serosa_pattern;
 uniform vec2 atlas_per_metre;
 uniform float colour_by_temperature; // 1: the paper's eq. 15, a function of the present temperature.
@@ -69,11 +68,18 @@ void main() {
   float ink = PlannedInk(m);
   vec3 bend = noise.rgb - 0.5;
   vec3 n = normalize(normal + 0.12 * bend);
-  vec3 film = normalize(normal + 0.42 * bend);
+  vec3 film = normalize(normal + 0.30 * bend + 0.34 * (texture(serosa_pattern, m * 57.0).rgb - 0.5));
   float facing = abs(dot(n, normalize(position)));
   float grazing = (1.0 - facing) * (1.0 - facing);
   vec3 albedo = mix(vec3(0.84, 0.40, 0.30), vec3(0.90, 0.60, 0.45), noise.g);
   float alpha = 0.21 + 0.22 * noise.r + 0.45 * grazing;
+
+  // Towards its rim the sheet becomes what goes on there (surroundings.frag).
+  float rim = smoothstep(0.15, 0.65, coordinate.w + 0.6 * bend.y);
+  vec3 beyond = vec3(0.62, 0.15, 0.11) * (1.0 + 0.8 * bend.x);
+  beyond = mix(beyond, vec3(0.80, 0.46, 0.16), 0.55 * smoothstep(0.35, 0.95, noise.g));
+  albedo = mix(albedo, beyond, rim);
+  alpha = mix(alpha, 1.0, rim);
 
   float living = 1.0 - smoothstep(0.05, 0.5, damage);
   // Warm tissue reddens, then pales as its protein coagulates (from about 60 degrees).
@@ -95,14 +101,14 @@ void main() {
   float hot = colour_by_temperature * clamp((celsius - 45.0) / 55.0, 0.0, 1.0);
   albedo = mix(albedo, vec3(0.22, 0.075, 0.022), hot);
   alpha = mix(alpha, 0.95, hot);
-  // Blood lies on top: the low bits of the fourth channel (geometry/atlas.h). Near slits and blood it is read without
-  // interpolation: values between closed and open texels would look like blood.
-  float own = heat.a < 0.97 ? texelFetch(atlas, ivec2(m * atlas_per_metre * vec2(textureSize(atlas, 0))), 0).a : 1.0;
-  float blood = own < 0.5 ? 0.0 : smoothstep(0.12, 0.7, 2.0 - 2.0 * own);
-  albedo = mix(albedo, vec3(0.30, 0.006, 0.008), 0.95 * blood);
-  alpha = mix(alpha, 0.96, blood);
+  // Blood lies on top and seeps away where the sheet ends.
+  float blood = heat.a < 0.97 ? BloodAt(m * atlas_per_metre, 1.0) * (1.0 - smoothstep(0.5, 0.95, coordinate.w)) : 0.0;
+  float bloody = smoothstep(0.15, 0.45, blood);
+  albedo = mix(albedo, BloodColour(blood), bloody);
+  alpha = mix(alpha, 0.97, bloody);
+  film = normalize(mix(film, normal + 0.12 * bend, bloody));
 
-  float wet = 1.6 * (1.0 - 0.92 * max(brown, 0.3 * pale));
+  float wet = mix(1.6 * (1.0 - 0.92 * max(brown, 0.3 * pale)), 1.8, bloody);
 
   // The fascia's fibres run obliquely across the organ with varying density; burns of the peritoneum apply to them as
   // well.
@@ -113,6 +119,10 @@ void main() {
   vec3 fascia = mix(vec3(0.86, 0.76, 0.66), vec3(0.26, 0.10, 0.035), seared);
   vec4 upper = vec4(albedo, heat.a < 0.5 ? 0.0 : alpha);
   vec4 lower = vec4(fascia, heat_below.a < 0.5 ? 0.0 : mix(0.09 + 0.30 * strand, 0.9, max(seared, tanned)));
+  // A line of sight that enters through the slit and meets the fascia has met the wall of the cut between the two.
+  float wall = heat.a < 0.5 && heat_below.a >= 0.5 ? 1.0 : 0.0;
+  vec3 raw = mix(vec3(0.80, 0.52, 0.40), vec3(0.50, 0.26, 0.11), tanned);
+  lower = mix(lower, vec4(mix(raw, vec3(0.13, 0.05, 0.02), seared), 0.97), wall);
 #ifdef AS_PRINTED
   float v = clamp((celsius - printed_limits.x) / (printed_limits.y - printed_limits.x), 0.0, 1.0);
   int which = v > printed_limits.z ? 0 : v > printed_limits.w ? 1 : 2;
@@ -129,5 +139,5 @@ void main() {
   // Highlights are opaque.
   float gloss;
   vec3 shaded = ShadeTissue(albedo, vec3(0.30, 0.16, 0.10), n, film, position, wet, gloss);
-  fragment = vec4(ToneMap(shaded), min(both + 0.8 * gloss, 1.0));
+  fragment = vec4(ToneMap(shaded), min(both + 0.8 * gloss, 1.0) * (1.0 - smoothstep(0.93, 1.0, coordinate.w)));
 }
