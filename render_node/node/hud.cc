@@ -24,11 +24,11 @@ std::string Number(const char* format, double value) {
 
 std::string ForceBar(int tool, float force_N, float limit_N) {
   const int full = std::clamp(static_cast<int>(std::ceil(kBar * force_N / limit_N - 0.05f)), 0, kBar);
-  return std::string(kShort[static_cast<std::size_t>(tool)]) + " " + std::string(static_cast<std::size_t>(full), '#') +
-         std::string(static_cast<std::size_t>(kBar - full), '-') + Number(" %.1f N", force_N);
+  std::string bar = std::string(kShort[static_cast<std::size_t>(tool)]) + " ";
+  for (int k = 0; k < kBar; ++k) bar += k < full ? "■" : "□";
+  return bar + Number(" %.1f N", force_N);
 }
 
-/// The overlay has capitals only.
 std::string InCapitals(std::string_view name) {
   std::string text(name);
   for (char& c : text) c = c == '_' ? ' ' : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
@@ -135,7 +135,7 @@ std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
     texts.push_back({Corner::kBottomRight, line++, Number("SLIT %.0f mm", 1000.0 * state.slit_m)});
   }
   if (state.tip_C) {
-    texts.push_back({Corner::kBottomRight, line, Number("TIP %.0f C", *state.tip_C)});
+    texts.push_back({Corner::kBottomRight, line, Number("TIP %.0f °C", *state.tip_C)});
   }
   return texts;
 }

@@ -289,13 +289,14 @@ void LaparoscopeView::OpenVessels(const Vec2f& material, double session_time_s) 
 
 bool LaparoscopeView::UpdateEffects(double session_time_s) {
   const bool smoking = impl_->smoke.Update(session_time_s);
+  impl_->optics.SetHaze(impl_->smoke.haze());
   const AtlasRect stained = impl_->bleeding.Update(session_time_s, impl_->layers.membrane(), &impl_->atlas);
   impl_->atlas_texture.Update(stained);
   const bool changed = smoking || !stained.empty();
   if (changed) {
     impl_->optics.SceneChanged();
   }
-  return changed || impl_->bleeding.sources() > 0 || impl_->bleeding.drops() > 0;
+  return changed || impl_->smoke.haze() > 0 || impl_->bleeding.sources() > 0 || impl_->bleeding.drops() > 0;
 }
 
 const Atlas& LaparoscopeView::atlas() const { return impl_->atlas; }

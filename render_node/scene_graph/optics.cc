@@ -78,6 +78,7 @@ Optics::Optics(const Laparoscope& scope, int width, int height, osg::Node* backg
       texture_most_(new osg::Uniform("texture_most", osg::Vec2(1, 1))),
       pixel_(new osg::Uniform("pixel", osg::Vec2())),
       soil_(new osg::Uniform("soil", 0.0f)),
+      haze_(new osg::Uniform("haze", 0.0f)),
       clear_lens_(MakeProgram("field.vert", "field.frag")),
       smooth_lens_(MakeProgram("field.vert", "smooth.frag")),
       soiled_lens_(MakeProgram("field.vert", "soiled.frag")) {
@@ -165,6 +166,8 @@ void Optics::AddField() {
   field.state()->addUniform(texture_most_);
   field.state()->addUniform(pixel_);
   field.state()->addUniform(soil_);
+  field.state()->addUniform(haze_);
+  field.state()->addUniform(new osg::Uniform("smoke", osg::Vec3(0.64f, 0.60f, 0.58f)));
   field.state()->setMode(GL_DEPTH_TEST, osg::StateAttribute::OFF);
   field.state()->setRenderBinDetails(0, "RenderBin");
   std::vector<Vec3f> positions{Vec3f::Zero()};

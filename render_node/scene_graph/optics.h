@@ -26,6 +26,8 @@ class Optics {
   void SetScope(const Laparoscope& scope);
   /// 0: clear lens … 1: nothing to be seen (services/base/core/lens.h).
   void SetSoil(float soil);
+  /// Share of the light that smoke scatters: 0 none.
+  void SetHaze(float haze) { haze_->set(haze); }
   /// Must be called when the scene has changed since its last picture.
   void SceneChanged();
   [[nodiscard]] osg::Group* node() const { return node_; }
@@ -49,7 +51,7 @@ class Optics {
   int height_;
   float scale_ = 1, most_ = 1;
   osg::ref_ptr<osg::Group> node_;
-  osg::ref_ptr<osg::Uniform> circle_radius_, picture_centre_, texture_scale_, texture_most_, pixel_, soil_;
+  osg::ref_ptr<osg::Uniform> circle_radius_, picture_centre_, texture_scale_, texture_most_, pixel_, soil_, haze_;
   osg::ref_ptr<osg::Program> clear_lens_, smooth_lens_, soiled_lens_;
   osg::ref_ptr<osg::StateSet> field_state_;
   Target background_, scene_;

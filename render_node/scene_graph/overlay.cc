@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <vector>
 
-#include "render_node/geometry/glyphs.h"
 #include "render_node/scene_graph/atlas_texture.h"
 #include "render_node/scene_graph/program.h"
 
@@ -26,12 +25,11 @@ Overlay::Overlay(int width, int height) : mesh_("overlay", true) {
 void Overlay::SetSize(int width, int height) {
   width_ = width;
   height_ = height;
-  const int dot = DotSize(height);
-  if (dot == dot_) return;
-  dot_ = dot;
-  const GlyphSheet sheet = MakeGlyphSheet(dot);
-  sheet_width_ = sheet.width;
-  osg::ref_ptr<osg::Texture2D> texture = MakeTexture(sheet.width, sheet.height, 1, sheet.pixels, false);
+  const int capital = CapitalHeight(height);
+  if (capital == capital_) return;
+  capital_ = capital;
+  sheet_ = MakeGlyphSheet(capital);
+  osg::ref_ptr<osg::Texture2D> texture = MakeTexture(sheet_.width, sheet_.height, 1, sheet_.pixels, false);
   texture->setFilter(osg::Texture::MIN_FILTER, osg::Texture::NEAREST);
   texture->setFilter(osg::Texture::MAG_FILTER, osg::Texture::NEAREST);
   mesh_.state()->setTextureAttribute(kGlyphUnit, texture);
@@ -41,32 +39,31 @@ void Overlay::Set(std::span<const OverlayText> texts) {
   std::vector<Vec3f> positions;
   std::vector<std::array<float, 4>> coordinates, colours;
   std::vector<Triangle> triangles;
-  const int margin = 2 * dot_;
+  const int margin = 2 * capital_ / 3;
+  const int pitch = sheet_.sizes[0].height;
   for (const OverlayText& text : texts) {
     const bool top = text.corner == Corner::kTopLeft || text.corner == Corner::kTopRight;
     const bool left = text.corner == Corner::kTopLeft || text.corner == Corner::kBottomLeft;
-    const int dot = text.size * dot_;
-    const int glyph_width = kGlyphWidth * dot / 2, glyph_height = kGlyphHeight * dot / 2;
-    const int length = glyph_width * static_cast<int>(text.text.size());
-    const int pitch = glyph_height + dot;
+    const GlyphSheet::Size& size = sheet_.sizes[text.size > 1 ? 1 : 0];
+    const std::u32string characters = Characters(text.text);
+    int length = 0;
+    for (const char32_t character : characters) length += size.Of(character).width;
     int x = left ? margin : width_ - margin - length;
-    const int y = top ? height_ - margin - pitch * (text.line + 1) : margin + pitch * text.line;
-    for (const char character : text.text) {
+    const int y = top ? height_ - margin - pitch * text.size * (text.line + 1) : margin + pitch * text.size * text.line;
+    for (const char32_t character : characters) {
       const auto first = static_cast<Index>(positions.size());
-      const int glyph = GlyphIndex(character);
+      const Glyph& glyph = size.Of(character);
       for (int corner = 0; corner < 4; ++corner) {
-        const int dx = corner == 1 || corner == 2 ? 1 : 0, dy = corner >= 2 ? 1 : 0;
-        positions.emplace_back(2.0f * static_cast<float>(x + dx * glyph_width) / static_cast<float>(width_) - 1,
-                               2.0f * static_cast<float>(y + dy * glyph_height) / static_cast<float>(height_) - 1,
-                               0.0f);
-        coordinates.push_back(
-            {static_cast<float>((glyph + dx) * kGlyphWidth * dot_) / 2.0f / static_cast<float>(sheet_width_),
-             static_cast<float>(dy), 0, 0});
+        const int dx = corner == 1 || corner == 2 ? glyph.width : 0, dy = corner >= 2 ? size.height : 0;
+        positions.emplace_back(2.0f * static_cast<float>(x + dx) / static_cast<float>(width_) - 1,
+                               2.0f * static_cast<float>(y + dy) / static_cast<float>(height_) - 1, 0.0f);
+        coordinates.push_back({static_cast<float>(glyph.x + dx) / static_cast<float>(sheet_.width),
+                               static_cast<float>(size.y + dy) / static_cast<float>(sheet_.height), 0, 0});
         colours.push_back(text.warning ? kWarning : kText);
       }
       triangles.push_back({first, first + 1, first + 2});
       triangles.push_back({first, first + 2, first + 3});
-      x += glyph_width;
+      x += glyph.width;
     }
   }
   mesh_.SetPositions(positions);

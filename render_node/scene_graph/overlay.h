@@ -4,6 +4,7 @@
 #include <array>
 #include <string>
 
+#include "render_node/scene_graph/font.h"
 #include "render_node/scene_graph/mesh.h"
 
 namespace fulcrum::render {
@@ -12,10 +13,10 @@ enum class Corner { kTopLeft, kTopRight, kBottomLeft, kBottomRight };
 
 struct OverlayText {
   Corner corner;
-  int line;  ///< 0 is nearest to the upper or lower edge.
-  std::string text;
+  int line;              ///< 0 is nearest to the upper or lower edge.
+  std::string text;      ///< UTF-8; characters that the font's sheet lacks become question marks.
   bool warning = false;  ///< Red instead of grey.
-  int size = 1;          ///< Factor on height and line pitch of plain text.
+  int size = 1;          ///< Factor on height and line pitch of plain text: 1 or 2.
 };
 
 class Overlay {
@@ -32,8 +33,8 @@ class Overlay {
  private:
   int width_;
   int height_;
-  int dot_ = 0;  // Size of a dot of the font [half pixels].
-  int sheet_width_ = 0;
+  int capital_ = 0;  // Height of a capital of plain text [pixels].
+  GlyphSheet sheet_;
   Mesh mesh_;
 };
 

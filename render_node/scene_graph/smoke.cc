@@ -16,6 +16,11 @@ constexpr float kDrift_m_s = 0.005f;
 constexpr float kFirstRadius_m = 0.0015f;
 constexpr float kGrowth_m_s = 0.0060f;
 constexpr float kOpacity = 0.50f;
+// A litre of gas every few seconds clears the cavity; cutting without a pause reaches half of the densest haze in 5 s.
+constexpr double kClears_s = 6;
+constexpr double kHalfHaze = 45;  // [puffs]
+constexpr double kDensest = 0.40;
+constexpr double kHazeStep = 1.0 / 64;
 
 }  // namespace
 
@@ -28,6 +33,7 @@ void Smoke::Add(const Vec3f& p_W, double session_time_s) {
   if (session_time_s - last_birth_s_ < kLeastInterval_s) {
     return;
   }
+  puffs_in_gas_ = puffs_in_gas_ * std::exp((last_birth_s_ - session_time_s) / kClears_s) + 1;
   last_birth_s_ = session_time_s;
   // Multiples of the golden angle distribute the drift directions evenly, without a random number.
   puffs_[next_] = {p_W, session_time_s, 2.39996f * static_cast<float>(next_)};
@@ -35,12 +41,16 @@ void Smoke::Add(const Vec3f& p_W, double session_time_s) {
 }
 
 bool Smoke::Update(double session_time_s) {
+  const double puffs = puffs_in_gas_ * std::exp(std::min(0.0, last_birth_s_ - session_time_s) / kClears_s);
+  const auto haze = static_cast<float>(kHazeStep * std::floor(kDensest * puffs / (puffs + kHalfHaze) / kHazeStep));
+  const bool cleared = haze != haze_;
+  haze_ = haze;
   const bool shown = shown_;
   shown_ = std::any_of(puffs_.begin(), puffs_.end(), [&](const Puff& puff) {
     return session_time_s >= puff.born_s && session_time_s - puff.born_s < kLife_s;
   });
   if (!shown && !shown_) {
-    return false;
+    return cleared;
   }
   std::vector<Vec3f> positions;
   std::vector<std::array<float, 4>> coordinates;

@@ -1,5 +1,6 @@
-// Steam and smoke of the cut: a bounded number of soft puffs that rise, grow and fade. The drawing is a function of the
-// puffs' start times and of the present time, so it does not depend on the number of pictures drawn before.
+// Steam and smoke of the cut: a bounded number of soft puffs that rise, grow and fade, and what they leave in the gas
+// of the cavity, which clears as the insufflator exchanges it. Both are functions of the puffs' start times and of the
+// present time, so they do not depend on the number of pictures drawn before.
 #pragma once
 
 #include <array>
@@ -14,9 +15,11 @@ class Smoke {
   /// Starts a puff at p_W [m], which replaces the oldest one. Calls within kLeastInterval of the last start are
   /// ignored.
   void Add(const Vec3f& p_W, double session_time_s);
-  /// Builds the squares for this time. Returns true while puffs are visible, and once after the last one has
-  /// disappeared.
+  /// Builds the squares for this time. Returns true while puffs are visible, once after the last one has disappeared,
+  /// and when the haze has changed.
   bool Update(double session_time_s);
+  /// Share of the light that the smoke in the cavity scatters before it reaches the eye, in steps of 1/64: 0 clear.
+  [[nodiscard]] float haze() const { return haze_; }
   [[nodiscard]] osg::Geometry* geometry() const { return mesh_.geometry(); }
   [[nodiscard]] osg::StateSet* state() const { return mesh_.state(); }
 
@@ -30,6 +33,8 @@ class Smoke {
   std::size_t next_ = 0;
   bool shown_ = true;
   double last_birth_s_ = -1e9;
+  double puffs_in_gas_ = 0;  // At the last birth; those that have left count in part.
+  float haze_ = 0;
   Mesh mesh_;
 };
 

@@ -53,8 +53,9 @@ TissueLayers::TissueLayers(const SceneView& scene, const Laparoscope& scope)
 void TissueLayers::FindRim() {
   const MembraneGrid& grid = scene_.membrane;
   rim_.assign(grid.node_count(), 0.0f);
-  const bool goes_on = std::ranges::any_of(
-      scene_.static_surfaces, [](const StaticSurface& surface) { return surface.role == SurfaceRole::kRetroperitoneum; });
+  const bool goes_on = std::ranges::any_of(scene_.static_surfaces, [](const StaticSurface& surface) {
+    return surface.role == SurfaceRole::kRetroperitoneum;
+  });
   if (!goes_on || grid.rows < 2 || grid.cols < 2) {
     return;
   }

@@ -71,7 +71,7 @@ class TissueLayers {
   std::vector<Triangle> fat_shown_;
   std::vector<float> fat_bared_;
   std::vector<Triangle> chosen_;  // Scratch: triangles of the membrane at the level of detail that is needed.
-  std::vector<float> rim_;  // Per node of the membrane's grid.
+  std::vector<float> rim_;        // Per node of the membrane's grid.
   bool tissue_changed_ = true, topology_changed_ = true, scope_changed_ = true;
   osg::ref_ptr<osg::Geode> geode_ = new osg::Geode;
   Layer rectum_, fat_layer_, sheet_;

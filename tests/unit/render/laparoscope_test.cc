@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "render_node/geometry/camera_control.h"
-#include "render_node/geometry/glyphs.h"
 #include "render_node/geometry/solid.h"
 #include "render_node/geometry/tissue_pattern.h"
 
@@ -152,28 +151,6 @@ TEST(LaparoscopeTest, ThePictureKeepsItsShapeInAnyWindow) {
       ASSERT_NEAR(9.0 * box.width, 16.0 * box.height, 8.0 + 1e-9) << "half a pixel of the width or of the height";
     }
   }
-}
-
-TEST(GlyphTest, TextIsAShareOfThePictureAndNeverSmallerThanTenPixels) {
-  EXPECT_EQ(7 * DotSize(360) / 2, 10);
-  for (const int height : {540, 720, 1080, 2160}) {
-    EXPECT_GE(3.5 * DotSize(height), 0.0259 * height - 3.5);
-    EXPECT_LE(3.5 * DotSize(height), 0.026 * height);
-  }
-}
-
-TEST(GlyphTest, ADotOfOneAndAHalfPixelsHasTheLightOfItsArea) {
-  const GlyphSheet whole = MakeGlyphSheet(2), half = MakeGlyphSheet(3), large = MakeGlyphSheet(16);
-  const auto light = [](const GlyphSheet& sheet) {
-    double sum = 0;
-    for (const std::uint8_t pixel : sheet.pixels) sum += pixel;
-    return sum / 255;
-  };
-  EXPECT_EQ(half.width, whole.width * 3 / 2);
-  EXPECT_EQ(half.height, whole.height * 3 / 2);
-  EXPECT_EQ(large.height, 8 * whole.height);
-  EXPECT_NEAR(light(half), 2.25 * light(whole), 0.01 * light(half));
-  EXPECT_EQ(light(large), 64 * light(whole));
 }
 
 }  // namespace
