@@ -12,6 +12,8 @@
 namespace fulcrum::render {
 namespace {
 
+constexpr std::uint32_t kSeedStep = 101;  // More than the seeds of one set of patterns differ by.
+
 // The standard fixes the sequence of std::mt19937 but not those of its distributions.
 class Uniform {
  public:
@@ -67,10 +69,10 @@ std::uint8_t ToByte(float value) {
 }
 
 /// Square RGBA8 image with the three noises, alpha 0.
-std::vector<std::uint8_t> MakeNoises(int size) {
+std::vector<std::uint8_t> MakeNoises(int size, std::uint32_t seed) {
   std::vector<std::uint8_t> image(4u * static_cast<std::size_t>(size) * size);
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    Uniform uniform(static_cast<std::uint32_t>(17 + channel));
+    Uniform uniform(static_cast<std::uint32_t>(17 + channel) + kSeedStep * seed);
     std::vector<float> field(static_cast<std::size_t>(size) * size, 0.0f);
     for (const int cells : {5, 11, 23, 47}) {
       AddValueNoise(size, cells, std::pow(5.0f / static_cast<float>(cells), 0.75f), &uniform, &field);
@@ -84,11 +86,11 @@ std::vector<std::uint8_t> MakeNoises(int size) {
 
 }  // namespace
 
-std::vector<std::uint8_t> MakeNoisePattern(int size) {
-  std::vector<std::uint8_t> image = MakeNoises(size);
+std::vector<std::uint8_t> MakeNoisePattern(int size, std::uint32_t seed) {
+  std::vector<std::uint8_t> image = MakeNoises(size, seed);
   // Lobules: distance to the second nearest minus distance to the nearest of jittered centres.
   constexpr int kCells = 9;
-  Uniform uniform(5);
+  Uniform uniform(5 + kSeedStep * seed);
   std::array<std::array<float, 2>, kCells * kCells> centres;
   for (int y = 0; y < kCells; ++y) {
     for (int x = 0; x < kCells; ++x) {
@@ -118,13 +120,13 @@ std::vector<std::uint8_t> MakeNoisePattern(int size) {
   return image;
 }
 
-std::vector<std::uint8_t> MakeVesselPattern(int size) {
+std::vector<std::uint8_t> MakeVesselPattern(int size, std::uint32_t seed) {
   std::vector<float> image(static_cast<std::size_t>(size) * size, 0.0f);
   struct Walker {
     float x, y, angle, radius, left;
   };
   constexpr std::size_t kMostWalkers = 400;
-  Uniform uniform(29);
+  Uniform uniform(29 + kSeedStep * seed);
   std::vector<Walker> walkers;
   walkers.reserve(kMostWalkers);
   for (int k = 0; k < 7; ++k) {
@@ -164,9 +166,9 @@ std::vector<std::uint8_t> MakeVesselPattern(int size) {
   return bytes;
 }
 
-std::vector<std::uint8_t> MakeSerosaPattern(int size) {
-  std::vector<std::uint8_t> image = MakeNoises(size);
-  const std::vector<std::uint8_t> vessels = MakeVesselPattern(size);
+std::vector<std::uint8_t> MakeSerosaPattern(int size, std::uint32_t seed) {
+  std::vector<std::uint8_t> image = MakeNoises(size, seed);
+  const std::vector<std::uint8_t> vessels = MakeVesselPattern(size, seed);
   for (std::size_t i = 0; i < vessels.size(); ++i) {
     image[4 * i + 3] = vessels[i];
   }

@@ -42,7 +42,7 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
     : scene_(scene),
       window_(settings.window),
       ports_(ports),
-      stage_(stage ? std::move(stage) : std::make_unique<Stage>(scene, settings.window)),
+      stage_(stage ? std::move(stage) : std::make_unique<Stage>(scene, settings.window, settings.look)),
       view_(stage_->view),
       display_(*stage_->display),
       shape_{0, 0, static_cast<int>(scene.render.width), static_cast<int>(scene.render.height)},

@@ -44,6 +44,7 @@ struct RenderSettings {
   Quality quality = Quality::kAuto;  ///< Resolution of the scene.
   std::filesystem::path frames;      ///< Folder for the pictures; empty: no files.
   InputSettings inputs = {};         ///< Gamepads as hands.
+  Look look = {};
 };
 
 class RenderNode {

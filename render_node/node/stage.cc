@@ -46,7 +46,8 @@ void WarmUp(const SceneView& scene, Stage* stage) {
 
 }  // namespace
 
-Stage::Stage(const SceneView& scene, bool window) : view(scene), display(OpenDisplay(view, scene.render, window)) {
+Stage::Stage(const SceneView& scene, bool window, const Look& look)
+    : view(scene, look), display(OpenDisplay(view, scene.render, window)) {
   WarmUp(scene, this);
 }
 

@@ -12,7 +12,7 @@ namespace fulcrum::render {
 struct Stage {
   /// Builds the graph, opens OpenGL and draws once. Throws InputError if a window is requested and no display can be
   /// opened, std::runtime_error if OpenGL is missing. The arrays of `scene` must outlive it.
-  Stage(const SceneView& scene, bool window);
+  Stage(const SceneView& scene, bool window, const Look& look = {});
 
   LaparoscopeView view;
   std::unique_ptr<Display> display;

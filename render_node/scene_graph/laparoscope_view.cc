@@ -51,13 +51,14 @@ void Blend(osg::StateSet* state) {
 }
 
 struct LaparoscopeView::Impl {
-  explicit Impl(const SceneView& view);
+  Impl(const SceneView& view, const Look& given);
   void BindTextures();
   void ShowFat();
   void CastShadows();
   void ShineFrom(const Laparoscope& from);
 
   SceneView scene;
+  const Look look;
   Laparoscope scope;
   Atlas atlas;
   AtlasTexture atlas_texture;
@@ -69,7 +70,7 @@ struct LaparoscopeView::Impl {
   std::array<ToolSample, kMaxTools> tools{};
   bool tools_moved = true;
   Smoke smoke;
-  std::vector<std::uint8_t> serosa = MakeSerosaPattern(kSerosaTexels);
+  std::vector<std::uint8_t> serosa = MakeSerosaPattern(kSerosaTexels, look.patterns);
   Bleeding bleeding;
   Overlay overlay;
   osg::ref_ptr<osg::Group> scene_root = new osg::Group;
@@ -85,8 +86,9 @@ struct LaparoscopeView::Impl {
   Vec3f breath = Vec3f::Zero();
 };
 
-LaparoscopeView::Impl::Impl(const SceneView& view)
+LaparoscopeView::Impl::Impl(const SceneView& view, const Look& given)
     : scene(view),
+      look(given),
       scope(MakeLaparoscope(view.render)),
       atlas(view),
       atlas_texture(atlas),
@@ -133,7 +135,7 @@ void LaparoscopeView::Impl::BindTextures() {
     state->addUniform(new osg::Uniform(name, static_cast<int>(unit)));
   };
   bind(kAtlasUnit, "atlas", atlas_texture.texture());
-  noise = MakeNoisePattern(kNoiseTexels);
+  noise = MakeNoisePattern(kNoiseTexels, look.patterns);
   structures = map;
   bind(kNoiseUnit, "noise_pattern", MakeTexture(kNoiseTexels, kNoiseTexels, 4, noise, true));
   bind(kSerosaUnit, "serosa_pattern", MakeTexture(kSerosaTexels, kSerosaTexels, 4, serosa, true));
@@ -144,6 +146,8 @@ void LaparoscopeView::Impl::BindTextures() {
   state->addUniform(new osg::Uniform("atlas_per_metre", osg::Vec2(1 / size.x(), 1 / size.y())));
   state->addUniform(new osg::Uniform("light_position", vec3(scope.light_position)));
   state->addUniform(new osg::Uniform("light_axis", vec3(scope.light_axis)));
+  state->addUniform(new osg::Uniform("light_colour", vec3(look.light)));
+  state->addUniform(new osg::Uniform("tissue_tint", vec3(look.tissue)));
   state->addUniform(wall_direction);
   state->addUniform(light_power);
   // Patches of the paper's model carry no damage.
@@ -189,7 +193,10 @@ void LaparoscopeView::Impl::CastShadows() {
   shadow_mesh.SetTriangles(shadow.triangles());
 }
 
-LaparoscopeView::LaparoscopeView(const SceneView& scene) : impl_(std::make_unique<Impl>(scene)) { Update(); }
+LaparoscopeView::LaparoscopeView(const SceneView& scene, const Look& look)
+    : impl_(std::make_unique<Impl>(scene, look)) {
+  Update();
+}
 LaparoscopeView::~LaparoscopeView() = default;
 
 void LaparoscopeView::SetTissue(std::span<const float> xyz) { impl_->layers.SetTissue(xyz); }

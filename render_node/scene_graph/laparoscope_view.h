@@ -7,6 +7,7 @@
 
 #include "render_node/geometry/atlas.h"
 #include "render_node/geometry/laparoscope.h"
+#include "render_node/geometry/look.h"
 #include "render_node/scene_graph/overlay.h"
 #include "services/base/core/scene_view.h"
 
@@ -15,7 +16,7 @@ namespace fulcrum::render {
 class LaparoscopeView {
  public:
   /// Builds everything for `scene`, whose arrays must outlive it. Needs no OpenGL context.
-  explicit LaparoscopeView(const SceneView& scene);
+  explicit LaparoscopeView(const SceneView& scene, const Look& look = {});
   ~LaparoscopeView();
   LaparoscopeView(const LaparoscopeView&) = delete;
   LaparoscopeView& operator=(const LaparoscopeView&) = delete;

@@ -6,6 +6,8 @@ uniform vec3 light_position;
 uniform vec3 light_axis;
 uniform vec3 wall_direction; // Towards the lit wall above, which wet tissue reflects.
 uniform float light_power;   // Irradiance at 1 m; falls off with the square of the distance.
+uniform vec3 light_colour;   // Of all light that the camera gets: its white and its exposure.
+uniform vec3 tissue_tint;
 uniform float circle_radius; // Of the round picture [pixels].
 uniform vec2 picture_centre; // [pixels]
 
@@ -31,6 +33,7 @@ float Highlight(float cosine, float broad, float sharp) {
 vec3 ShadeTissue(vec3 albedo, vec3 scatter, vec3 normal, vec3 film, vec3 position, float wet, out float gloss) {
   vec3 l;
   float e = Irradiance(position, l);
+  albedo *= tissue_tint;
   vec3 v = normalize(-position);
   float side = sign(dot(normal, v));
   vec3 diffuse = clamp((side * dot(normal, l) + scatter) / (1.0 + scatter), 0.0, 1.0);
@@ -77,6 +80,6 @@ vec3 ShadeMetal(vec3 tint, vec3 normal, vec3 position) {
 vec3 ToneMap(vec3 colour) {
   vec2 r = (gl_FragCoord.xy - picture_centre) / circle_radius;
   float r2 = dot(r, r);
-  vec3 y = 1.0 / (1.0 + (0.95 - 0.55 * r2 * r2) * colour);
+  vec3 y = 1.0 / (1.0 + (0.95 - 0.55 * r2 * r2) * light_colour * colour);
   return sqrt(1.0 - y * y);
 }

@@ -78,6 +78,11 @@ void AddOptions(po::options_description* options) {
        "dataset: session time between two pictures, 0.01 to 3600 [s]")  //
       ("baseline", po::value<double>()->value_name("MM")->default_value(5),
        "dataset: distance of the right camera from the left one, 0 (no right pictures) to 100 [mm]")  //
+      ("vary", po::value<std::int64_t>()->value_name("N")->default_value(0),
+       "dataset: so many data sets in folders of their own, each with another light, tissue and scope; 0: one, as it "
+       "was")  //
+      ("seed", po::value<std::int64_t>()->value_name("N")->default_value(1),
+       "dataset: other numbers give other variations")  //
       ("test", po::value<std::vector<std::string>>()->value_name("NODE"),
        "node to test: physics, thermal, haptics or render")  //
       ("expect", po::value<std::string>()->value_name("HASH"),

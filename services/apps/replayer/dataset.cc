@@ -18,6 +18,7 @@
 #include "services/apps/replayer/projector.h"
 #include "services/apps/replayer/report_format.h"
 #include "services/apps/replayer/truth.h"
+#include "services/apps/replayer/variation.h"
 #include "services/base/core/error.h"
 
 namespace fulcrum::replay {
@@ -49,8 +50,8 @@ std::string FileName(std::uint64_t frame) { return Format("%06llu.png", static_c
 
 class DatasetMaker {
  public:
-  DatasetMaker(const DatasetSettings& settings, const SceneView& scene)
-      : settings_(settings), scene_(scene), projector_(settings.recording, scene), writer_(kWriters) {
+  DatasetMaker(const DatasetSettings& settings, const SceneView& scene, const render::Look& look)
+      : settings_(settings), scene_(scene), projector_(settings.recording, scene, look), writer_(kWriters) {
     projector_.replay().node().view().SetDetail(kTruthDetail);
     end_s_ = settings.until_s >= 0 ? std::min(settings.until_s, projector_.end_s()) : projector_.end_s();
     count_ = static_cast<std::uint64_t>(std::floor(end_s_ / settings.every_s + 1e-6)) + 1;
@@ -145,7 +146,23 @@ class DatasetMaker {
 DatasetResult MakeDataset(const DatasetSettings& settings, const SceneView& scene,
                           const std::function<void(double)>& progress) {
   RefuseFilled(settings.folder);
-  return DatasetMaker(settings, scene).Make(progress);
+  if (settings.variations == 0) return DatasetMaker(settings, scene, {}).Make(progress);
+  DatasetResult all;
+  std::string said;
+  for (std::uint32_t i = 0; i < settings.variations; ++i) {
+    const Variation variation = VariationOf(scene.render, settings.seed, i);
+    SceneView varied = scene;
+    varied.render = variation.camera;
+    DatasetSettings one = settings;
+    one.folder = settings.folder / Format("%03u", i);
+    const DatasetResult result = DatasetMaker(one, varied, variation.look).Make(progress);
+    all.frames += result.frames;
+    all.duration_s = result.duration_s;
+    // A set of variations that was interrupted names those that are whole.
+    said += VariationText(i, variation);
+    WriteText(settings.folder / "variations.jsonl", said);
+  }
+  return all;
 }
 
 }  // namespace fulcrum::replay

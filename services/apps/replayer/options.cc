@@ -133,6 +133,15 @@ void ReadDataset(const CommandLine& line, Options* options) {
   if (!(options->dataset_baseline_m >= 0 && options->dataset_baseline_m <= 0.1)) {
     throw InputError("--baseline: must be 0 (no right pictures) to 100 mm");
   }
+  const auto whole = [&](const char* name, std::int64_t most) {
+    const auto value = line.ValueOf<std::int64_t>(name);
+    if (value < 0 || value > most) {
+      throw InputError(std::string("--") + name + ": must be a whole number, 0 to " + std::to_string(most));
+    }
+    return static_cast<std::uint32_t>(value);
+  };
+  options->dataset_variations = whole("vary", 1000);
+  options->dataset_seed = whole("seed", 1'000'000'000);
 }
 
 void ReadFiles(const CommandLine& line, Options* options) {

@@ -19,9 +19,10 @@ struct Options {
   bool film = false;            ///< --film was given: only `recording` of `lock_step` and `scene` are used.
   std::filesystem::path video;  ///< File of --video; empty: it was not given. With `lock_step.until_s`.
   double video_within_s = 0;    ///< --within [s]; 0: without limit.
-  /// --dataset, --every, --baseline; the folder is empty: it was not given. With `lock_step.until_s`.
+  /// --dataset, --every, --baseline, --vary, --seed; the folder is empty: it was not given. With `lock_step.until_s`.
   std::filesystem::path dataset;
   double dataset_every_s = 0, dataset_baseline_m = 0;
+  std::uint32_t dataset_variations = 0, dataset_seed = 1;
   bool console = false;  ///< --console.
   LiveSettings live_settings;
   LockStepSettings lock_step;        ///< Without `folder`, which a run makes.

@@ -24,8 +24,8 @@ double EndOf(const std::filesystem::path& recording, std::int64_t start_ns) {
 
 }  // namespace
 
-Projector::Projector(const std::filesystem::path& recording, const SceneView& scene)
-    : recording_(recording), scene_(scene) {
+Projector::Projector(const std::filesystem::path& recording, const SceneView& scene, const render::Look& look)
+    : recording_(recording), scene_(scene), look_(look) {
   Begin();
   if (Read()) end_s_ = std::max(0.0, EndOf(recording_, replay_->session_start_ns()));
   if (end_s_ > kLongest_s) {
@@ -37,6 +37,7 @@ Projector::Projector(const std::filesystem::path& recording, const SceneView& sc
 void Projector::Begin() {
   replay_.reset();  // Two contexts of OpenGL at a time need twice the memory.
   render::RenderSettings settings;
+  settings.look = look_;
   settings.quality = render::Quality::kHigh;  // A picture that stands still is looked at.
   replay_.emplace(recording_, scene_, settings);
   at_s_ = read_s_ = 0;

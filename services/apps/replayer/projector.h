@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 
+#include "render_node/geometry/look.h"
 #include "render_node/offscreen/framebuffer.h"
 #include "services/apps/replayer/render_replay.h"
 #include "services/base/core/scene_view.h"
@@ -13,9 +14,9 @@ namespace fulcrum::replay {
 
 class Projector {
  public:
-  /// Draws in quality high. `scene` must outlive it. Throws InputError, MismatchError, and std::runtime_error when
-  /// OpenGL is missing.
-  Projector(const std::filesystem::path& recording, const SceneView& scene);
+  /// Draws in quality high, with the camera of `scene`, which must outlive it. Throws InputError, MismatchError, and
+  /// std::runtime_error when OpenGL is missing.
+  Projector(const std::filesystem::path& recording, const SceneView& scene, const render::Look& look = {});
 
   /// Session time of the last message [s].
   [[nodiscard]] double end_s() const { return end_s_; }
@@ -39,6 +40,7 @@ class Projector {
 
   const std::filesystem::path recording_;
   const SceneView& scene_;
+  const render::Look look_;
   std::function<void(const RenderReplay&, double)> follow_;
   std::optional<RenderReplay> replay_;
   double end_s_ = 0;

@@ -112,12 +112,15 @@ int RunVideo(const Options& options) {
 int RunDataset(const Options& options) {
   const scene::SceneFile scene(options.scene);
   const ProgressLine progress(options.quiet);
-  const DatasetSettings settings{options.lock_step.recording, options.dataset, options.lock_step.until_s,
-                                 options.dataset_every_s, options.dataset_baseline_m};
+  const DatasetSettings settings{options.lock_step.recording, options.dataset,
+                                 options.lock_step.until_s,   options.dataset_every_s,
+                                 options.dataset_baseline_m,  options.dataset_variations,
+                                 options.dataset_seed};
   const DatasetResult result = MakeDataset(settings, scene.view(), BeginFiles(progress));
   progress.Clear();
+  const std::filesystem::path first = options.dataset_variations > 0 ? options.dataset / "000" : options.dataset;
   std::cout << options.dataset.string() << ": " << result.frames << " frames, " << result.duration_s << " s; look at "
-            << (options.dataset / "sheet.png").string() << '\n';
+            << (first / "sheet.png").string() << '\n';
   if (!options.json.empty()) {
     WriteText(options.json, Format("{\n  \"frames\": %llu,\n  \"duration_s\": %.3f\n}\n",
                                    static_cast<unsigned long long>(result.frames), result.duration_s));

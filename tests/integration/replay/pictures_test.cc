@@ -1,6 +1,7 @@
 // The replayer's pictures: a recorded session drawn twice.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <boost/property_tree/json_parser.hpp>
 #include <boost/property_tree/ptree.hpp>
 #include <cstdint>
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "services/apps/replayer/projector.h"
+#include "services/apps/replayer/variation.h"
 #include "services/apps/replayer/video.h"
 #include "tests/integration/replay/short_session.h"
 #include "tests/support/cart.h"
@@ -233,6 +235,55 @@ TEST(Dataset, HasAllImagesOfEachFrameAndIsTheSameTwice) {
   EXPECT_EQ(count, kFrames);
 }
 
+TEST(Dataset, VariesLightTissueAndScopeByItsSeed) {
+  const testing::ShortSession session("vary_test", {.seconds = 0.5}, Small);
+  const auto made = [&](const char* name, const char* seed) {
+    const std::filesystem::path folder = session.folder() / name;
+    OutputOf("replayer", {session.recording(), "--dataset", folder, "--every", "0.4", "--vary", "2", "--seed", seed});
+    return FilesBelow(folder);
+  };
+  const auto first = made("first", "1");
+  EXPECT_TRUE(first == made("second", "1")) << "the same seed, the same files";
+  const auto other = made("other", "2");
+  std::vector<std::string> matrices;
+  for (const auto* files : {&first, &other}) {
+    for (const std::string folder : {"000", "001"}) {
+      ASSERT_EQ(files->count(folder + "/coco.json"), 1u) << "each is a data set of its own";
+      const std::string frames = files->at(folder + "/frames.jsonl");
+      const std::size_t begin = frames.find("world_to_camera");
+      matrices.push_back(frames.substr(begin, frames.find("]]", begin) - begin));
+      EXPECT_NE(files->at(folder + "/left/000000.png"), files->at("000/left/000001.png"));
+    }
+  }
+  for (std::size_t i = 0; i < matrices.size(); ++i) {
+    EXPECT_EQ(std::ranges::count(matrices, matrices[i]), 1) << "another scope";
+  }
+  const std::string lines = first.at("variations.jsonl");
+  EXPECT_EQ(std::ranges::count(lines, '\n'), 2);
+}
+
+TEST(Dataset, AVariationStaysWithinWhatIsPromised) {
+  RenderParams camera;
+  camera.fov_deg = 60;
+  const double distance = (camera.scope_tip_W - camera.scope_target_W).cast<double>().norm();
+  float darkest = 9, brightest = 0;
+  for (std::uint32_t i = 0; i < 300; ++i) {
+    const Variation variation = VariationOf(camera, 7, i);
+    const RenderParams& moved = variation.camera;
+    EXPECT_NEAR((moved.scope_tip_W - moved.scope_target_W).cast<double>().norm(), distance, 0.1001 * distance);
+    EXPECT_LE((moved.scope_target_W - camera.scope_target_W).cwiseAbs().maxCoeff(), 0.00401f);
+    EXPECT_LE(std::abs(moved.roll_deg), 12.001f);
+    EXPECT_NEAR(moved.fov_deg, 60, 6.001);
+    EXPECT_EQ(moved.width, camera.width);
+    EXPECT_NEAR(variation.look.tissue.mean(), 1, 0.151);
+    EXPECT_NE(variation.look.patterns, 0u);
+    darkest = std::min(darkest, variation.look.light.y());
+    brightest = std::max(brightest, variation.look.light.y());
+  }
+  EXPECT_NEAR(darkest, 0.6, 0.02);
+  EXPECT_NEAR(brightest, 1.5, 0.02);
+}
+
 TEST(Dataset, DestroysNoFolderAndRefusesImpossibleSteps) {
   const testing::ShortSession session("no_dataset_test", {.seconds = 0.5}, Small);
   const auto expect_refused = [&](const std::vector<std::string>& arguments, const std::string& words) {
@@ -248,6 +299,8 @@ TEST(Dataset, DestroysNoFolderAndRefusesImpossibleSteps) {
   expect_refused({"--dataset", session.folder()}, "is not empty");
   expect_refused({"--dataset", session.folder() / "d", "--every", "0"}, "--every");
   expect_refused({"--dataset", session.folder() / "d", "--baseline", "-1"}, "--baseline");
+  expect_refused({"--dataset", session.folder() / "d", "--vary", "1001"}, "--vary");
+  expect_refused({"--dataset", session.folder() / "d", "--vary", "-1"}, "--vary");
   EXPECT_TRUE(FilesBelow(session.folder()) == before);
 }
 
