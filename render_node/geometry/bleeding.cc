@@ -12,16 +12,17 @@ namespace {
 constexpr double kStep_s = 0.02;
 constexpr int kMostSteps = 50;  // Maximum number of steps per update; the rest of a longer pause is skipped.
 constexpr int kDropEvery = 14;  // Steps between two drops.
+constexpr int kClots = 400;     // Steps after which a small vessel has closed by itself.
 constexpr int kRim = 16;        // Number of points around a cut that are checked for vessels.
 constexpr float kRimRadii[] = {0.0005f, 0.0008f};  // [m]
-constexpr float kVessel = 0.5f;
+constexpr float kVessel = 0.75f;
 constexpr std::uint8_t kSealed = 128;
 constexpr float kRun_m = 0.024f;
 constexpr float kSpeed_m_s = 0.009f;  // On a vertical wall.
 constexpr float kLeastSlope = 0.15f;  // Lower limit of the slope: a film also creeps on a horizontal surface.
 constexpr float kSameVessel_m = 0.006f;
-constexpr float kPool_m = 0.0024f;  // Radius at the source.
-constexpr float kDrop_m = 0.0016f;  // Radius of a full drop.
+constexpr float kPool_m = 0.0018f;  // Radius at the source.
+constexpr float kDrop_m = 0.0012f;  // Radius of a full drop.
 constexpr float kStray = 0.4f;      // [rad]
 constexpr float kThick = 1.0f, kThin = 0.6f;
 
@@ -103,7 +104,7 @@ AtlasRect Bleeding::Update(double session_time_s, const MembraneMesh& membrane, 
 
 AtlasRect Bleeding::Bleed(Source* source, Atlas* atlas) {
   const auto texel = atlas->At(source->material);
-  if (!texel || (*texel)[3] < 128 || (*texel)[1] >= kSealed) {
+  if (!texel || (*texel)[3] < 128 || (*texel)[1] >= kSealed || source->steps >= kClots) {
     source->open = false;
     return {};
   }

@@ -23,7 +23,7 @@ class Bleeding {
   void Cut(const Vec2f& material, const Atlas& atlas, double session_time_s);
 
   /// Moves the drops, stains the atlas, and closes sources that heat has sealed (damage above a half, or tissue
-  /// removed). Returns the changed rectangle.
+  /// removed) or that have bled for 8 s. Returns the changed rectangle.
   AtlasRect Update(double session_time_s, const MembraneMesh& membrane, Atlas* atlas);
 
   [[nodiscard]] int sources() const;

@@ -8,6 +8,16 @@ uniform sampler2D structures;
 uniform vec2 atlas_per_metre;  // Atlas coordinates per metre of material.
 out vec4 fragment;
 
+const float kRelief = 3e-4; // Height of a lobule over the clefts [m].
+
+// Gradient over the surface of a height above it, from its differences between neighbouring pixels.
+vec3 Slope(float height, vec3 n) {
+  vec3 x = dFdx(position), y = dFdy(position);
+  vec3 to_x = cross(y, n), to_y = cross(n, x);
+  float area = dot(x, to_x);
+  return (dFdx(height) * to_x + dFdy(height) * to_y) * (area / max(area * area, 1e-20));
+}
+
 void main() {
   vec2 m = coordinate.xy;
   vec4 broad = texture(noise_pattern, m * 9.0);
@@ -17,8 +27,8 @@ void main() {
   vec2 structure = texture(structures, m * atlas_per_metre).rg;
   vec3 bend = noise.rgb - 0.5;
   float lobule = noise.a;
-  vec3 n = normalize(normal + 0.45 * bend);
-  vec3 albedo = mix(vec3(0.50, 0.18, 0.08), vec3(0.91, 0.59, 0.19), lobule * (0.55 + 0.75 * broad.b));
+  vec3 n = normalize(normal - Slope(kRelief * lobule, normal) + 0.35 * bend);
+  vec3 albedo = mix(vec3(0.62, 0.29, 0.11), vec3(0.91, 0.60, 0.20), lobule * (0.55 + 0.75 * broad.b));
   // A ureter is a pale pink cord, a nerve a thin white one.
   float cord = smoothstep(0.35, 0.65, structure.r);
   float nerve = smoothstep(0.40, 0.70, structure.g);
@@ -30,15 +40,16 @@ void main() {
   float bared = smoothstep(0.30, 0.75, coordinate.w + 0.7 * (lobule - 0.5) + 1.2 * (broad.g - 0.5));
   float opened = max(heat.a < 0.5 ? 1.0 : 0.0, bared * smoothstep(0.0, 0.35, coordinate.w));
   float alpha = (0.30 + 0.25 * lobule) * cover; // Beneath intact tissue, which blurs what lies below.
-  alpha = max(alpha, (0.72 + 0.22 * lobule) * opened);
+  alpha = max(alpha, (0.86 + 0.10 * lobule) * opened);
   alpha = clamp(max(alpha, 0.9 * max(cord, nerve)), 0.0, 0.97);
   // Under a burn the fat is seared as well, least in the open middle of the slit.
   float dry = clamp(2.0 * heat.b, 0.0, 1.0);
   albedo *= mix(vec3(1.0), vec3(0.46, 0.27, 0.16), (heat.a < 0.5 ? 0.25 : 0.7) * dry);
-  float blood = heat.a < 0.75 ? BloodAt(m * atlas_per_metre, 0.0) : 0.0;
+  float blood = heat.a < 0.97 ? BloodAt(m * atlas_per_metre) : 0.0;
   float bloody = smoothstep(0.15, 0.45, blood);
   albedo = mix(albedo, BloodColour(blood), bloody);
   alpha = mix(alpha, 0.97, bloody);
+  vec3 film = normalize(mix(n, normal + 0.2 * bend, 0.5 * bloody)); // Blood fills half of a cleft.
   float gloss;
-  fragment = vec4(ToneMap(ShadeTissue(albedo, vec3(0.35, 0.25, 0.12), n, n, position, 0.8 + 0.8 * bloody, gloss)), alpha);
+  fragment = vec4(ToneMap(ShadeTissue(albedo, vec3(0.35, 0.25, 0.12), n, film, position, 0.8 + 0.8 * bloody, gloss)), alpha);
 }

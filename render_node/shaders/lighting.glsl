@@ -45,20 +45,20 @@ vec3 ShadeTissue(vec3 albedo, vec3 scatter, vec3 normal, vec3 film, vec3 positio
 }
 
 // Blood is the low bits of the atlas' fourth channel (geometry/atlas.h): interpolated here, because values between
-// closed and open texels would look like blood. closed: 1 counts the blood on closed texels, 0 only that in the slit.
+// closed and open texels would look like blood.
 uniform sampler2D atlas;
 
-float BloodOf(ivec2 texel, float closed) {
+float BloodOf(ivec2 texel) {
   float own = texelFetch(atlas, clamp(texel, ivec2(0), textureSize(atlas, 0) - 1), 0).a;
-  return own < 0.5 ? 2.0 * own : closed * (2.0 - 2.0 * own);
+  return own < 0.5 ? 2.0 * own : 2.0 - 2.0 * own;
 }
 
-float BloodAt(vec2 place, float closed) {
+float BloodAt(vec2 place) {
   vec2 at = place * vec2(textureSize(atlas, 0)) - 0.5;
   ivec2 low = ivec2(floor(at));
   vec2 part = at - vec2(low);
-  return mix(mix(BloodOf(low, closed), BloodOf(low + ivec2(1, 0), closed), part.x),
-             mix(BloodOf(low + ivec2(0, 1), closed), BloodOf(low + ivec2(1, 1), closed), part.x), part.y);
+  return mix(mix(BloodOf(low), BloodOf(low + ivec2(1, 0)), part.x),
+             mix(BloodOf(low + ivec2(0, 1)), BloodOf(low + ivec2(1, 1)), part.x), part.y);
 }
 
 // A film of blood absorbs more where it is thicker.

@@ -102,7 +102,7 @@ void main() {
   albedo = mix(albedo, vec3(0.22, 0.075, 0.022), hot);
   alpha = mix(alpha, 0.95, hot);
   // Blood lies on top and seeps away where the sheet ends.
-  float blood = heat.a < 0.97 ? BloodAt(m * atlas_per_metre, 1.0) * (1.0 - smoothstep(0.5, 0.95, coordinate.w)) : 0.0;
+  float blood = heat.a < 0.97 ? BloodAt(m * atlas_per_metre) * (1.0 - smoothstep(0.5, 0.95, coordinate.w)) : 0.0;
   float bloody = smoothstep(0.15, 0.45, blood);
   albedo = mix(albedo, BloodColour(blood), bloody);
   alpha = mix(alpha, 0.97, bloody);

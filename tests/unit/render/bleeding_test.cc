@@ -103,6 +103,15 @@ TEST_F(BleedingTest, HeatSealsIt) {
   EXPECT_EQ(Stained(), stained) << "the stains remain";
 }
 
+TEST_F(BleedingTest, ASmallVesselClosesByItself) {
+  Bleeding bleeding(view_, vessels_, 1, 16);
+  bleeding.Cut(place_, atlas_, 1.0);
+  for (double t = 1.1; t < 8.5; t += 0.1) bleeding.Update(t, membrane_, &atlas_);
+  EXPECT_EQ(bleeding.sources(), 1);
+  for (double t = 8.5; t < 9.5; t += 0.1) bleeding.Update(t, membrane_, &atlas_);
+  EXPECT_EQ(bleeding.sources(), 0);
+}
+
 TEST_F(BleedingTest, ACoagulatedOrBloodlessPlaceDoesNotBleed) {
   Bleeding without(view_, bloodless_, 1, 16);
   without.Cut(place_, atlas_, 1.0);
