@@ -12,10 +12,10 @@ namespace {
 constexpr double kStep_s = 0.02;
 constexpr int kMostSteps = 50;  // Maximum number of steps per update; the rest of a longer pause is skipped.
 constexpr int kDropEvery = 14;  // Steps between two drops.
-constexpr int kClots = 400;     // Steps after which a small vessel has closed by itself.
+constexpr double kClots_s = 8;  // Assumed: after this time a small vessel has closed by itself.
 constexpr int kRim = 16;        // Number of points around a cut that are checked for vessels.
 constexpr float kRimRadii[] = {0.0005f, 0.0008f};  // [m]
-constexpr float kVessel = 0.75f;
+constexpr float kVessel = 0.75f;                   // Of the pattern: from 0.5 on, a slit of 30 mm bled in six places.
 constexpr std::uint8_t kSealed = 128;
 constexpr float kRun_m = 0.024f;
 constexpr float kSpeed_m_s = 0.009f;  // On a vertical wall.
@@ -104,7 +104,7 @@ AtlasRect Bleeding::Update(double session_time_s, const MembraneMesh& membrane, 
 
 AtlasRect Bleeding::Bleed(Source* source, Atlas* atlas) {
   const auto texel = atlas->At(source->material);
-  if (!texel || (*texel)[3] < 128 || (*texel)[1] >= kSealed || source->steps >= kClots) {
+  if (!texel || (*texel)[3] < 128 || (*texel)[1] >= kSealed || source->steps >= kClots_s / kStep_s) {
     source->open = false;
     return {};
   }

@@ -25,7 +25,7 @@ std::string Number(const char* format, double value) {
 std::string ForceBar(int tool, float force_N, float limit_N) {
   const int full = std::clamp(static_cast<int>(std::ceil(kBar * force_N / limit_N - 0.05f)), 0, kBar);
   std::string bar = std::string(kShort[static_cast<std::size_t>(tool)]) + " ";
-  for (int k = 0; k < kBar; ++k) bar += k < full ? "■" : "□";
+  for (int k = 0; k < kBar; ++k) bar += k < full ? "▮" : "▯";
   return bar + Number(" %.1f N", force_N);
 }
 

@@ -93,6 +93,7 @@ void RenderNode::Step(const Tick& tick) {
   if (!ready()) {
     return;
   }
+  if (view_.HazeHasChanged(session_time_s_)) changed_on_screen_ = changed_in_file_ = true;
   // A new reader receives a picture even if nothing moves.
   const bool streamed = std::exchange(streams_, stream_ && stream_->has_readers());
   if (streams_ && !streamed) changed_on_screen_ = true;
@@ -104,7 +105,9 @@ void RenderNode::Step(const Tick& tick) {
 }
 
 void RenderNode::FollowEffects() {
-  if (!ready() || !view_.UpdateEffects(session_time_s_)) return;
+  if (!ready()) return;
+  const bool cleared = view_.HazeHasChanged(session_time_s_);
+  if (!view_.UpdateEffects(session_time_s_) && !cleared) return;
   changed_on_screen_ = true;
   view_.Update();  // Blood runs down the present shape, and steam rises from it.
 }

@@ -44,7 +44,7 @@ struct RenderSettings {
   Quality quality = Quality::kAuto;  ///< Resolution of the scene.
   std::filesystem::path frames;      ///< Folder for the pictures; empty: no files.
   InputSettings inputs = {};         ///< Gamepads as hands.
-  Look look = {};
+  Look look = {};                    ///< Of a stage that the node makes.
 };
 
 class RenderNode {

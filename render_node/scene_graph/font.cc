@@ -21,31 +21,44 @@ extern "C" const unsigned char fulcrum_font_begin[], fulcrum_font_end[];
 namespace fulcrum::render {
 namespace {
 
-constexpr std::u32string_view kOthers = U"°±²·µ×–■□";
-constexpr float kCapitalOfEm = 0.729f;  // Of DejaVu Sans.
+constexpr std::u32string_view kOthers = U"°±²·µ×–▮▯";
+constexpr double kCapitalOfEm = 0.729;  // Of DejaVu Sans.
+constexpr int kWidest = 4096;           // Of the sheet [pixels]: any OpenGL has such a texture.
 
-void Check(FT_Error error, const char* what) {
-  if (error != 0)
-    throw std::runtime_error(std::string("the font cannot be ") + what + ": FreeType error " + std::to_string(error));
+void Check(FT_Error error) {
+  if (error != 0) throw std::runtime_error("FreeType cannot draw the font: error " + std::to_string(error));
 }
 
-class Face {
- public:
-  Face() {
-    Check(FT_Init_FreeType(&library_), "read");
-    Check(FT_New_Memory_Face(library_, fulcrum_font_begin, fulcrum_font_end - fulcrum_font_begin, 0, &face_), "read");
-  }
-  ~Face() { FT_Done_FreeType(library_); }  // Its faces as well.
-  Face(const Face&) = delete;
-  Face& operator=(const Face&) = delete;
-  [[nodiscard]] FT_Face get() const { return face_; }
+struct EndLibrary {
+  void operator()(FT_Library library) const { FT_Done_FreeType(library); }  // And its faces.
+};
 
- private:
-  FT_Library library_ = nullptr;
-  FT_Face face_ = nullptr;
+/// A drawn character. Its cell begins where the first pixel is, if that lies before its origin.
+struct Drawn {
+  int width = 0;          ///< Of the cell [pixels].
+  int left = 0, top = 0;  ///< Of the pixels: from the cell's left side, and of their first row over the line.
+  int columns = 0, rows = 0;
+  std::vector<std::uint8_t> pixels;  ///< First row first.
 };
 
 int Pixels(FT_Pos units) { return static_cast<int>((units + 63) >> 6); }
+
+Drawn DrawCharacter(FT_Face face, char32_t character) {
+  Check(FT_Load_Char(face, character, FT_LOAD_RENDER | FT_LOAD_TARGET_LIGHT));
+  const FT_GlyphSlot slot = face->glyph;
+  Drawn drawn;
+  drawn.columns = static_cast<int>(slot->bitmap.width);
+  drawn.rows = static_cast<int>(slot->bitmap.rows);
+  drawn.left = std::max(0, slot->bitmap_left);
+  drawn.top = slot->bitmap_top;
+  const int before = std::max(0, -slot->bitmap_left);
+  drawn.width = std::max(before + Pixels(slot->advance.x), drawn.left + drawn.columns);
+  for (int row = 0; row < drawn.rows; ++row) {
+    const std::uint8_t* first = slot->bitmap.buffer + row * slot->bitmap.pitch;
+    drawn.pixels.insert(drawn.pixels.end(), first, first + drawn.columns);
+  }
+  return drawn;
+}
 
 }  // namespace
 
@@ -55,56 +68,45 @@ const Glyph& GlyphSheet::Size::Of(char32_t character) const {
 }
 
 GlyphSheet MakeGlyphSheet(int capital_height) {
-  const Face face;
+  FT_Library opened = nullptr;
+  Check(FT_Init_FreeType(&opened));
+  const std::unique_ptr<FT_LibraryRec_, EndLibrary> library(opened);
+  FT_Face face = nullptr;
+  Check(FT_New_Memory_Face(opened, fulcrum_font_begin, fulcrum_font_end - fulcrum_font_begin, 0, &face));
   std::u32string characters(kOthers);
   for (char32_t c = U' '; c <= U'~'; ++c) characters += c;
 
   GlyphSheet sheet;
-  std::array<int, 2> baseline{};
+  sheet.width = kWidest;
   for (std::size_t k = 0; k < sheet.sizes.size(); ++k) {
     GlyphSheet::Size& size = sheet.sizes[k];
-    const auto em = static_cast<FT_UInt>(
-        std::lround(static_cast<float>((k + 1) * static_cast<std::size_t>(capital_height)) / kCapitalOfEm));
-    Check(FT_Set_Pixel_Sizes(face.get(), 0, em), "scaled");
-    baseline[k] = Pixels(-face.get()->size->metrics.descender);
-    size.y = sheet.height;
-    size.height = baseline[k] + Pixels(face.get()->size->metrics.ascender);
-    int x = 0;
-    for (const char32_t c : characters) {
-      Check(FT_Load_Char(face.get(), c, FT_LOAD_TARGET_LIGHT), "drawn");
-      const int width = Pixels(face.get()->glyph->advance.x);
-      size.glyphs[c] = {x, width};
-      x += width;
-    }
-    sheet.width = std::max(sheet.width, x);
-    sheet.height += size.height;
-  }
-  sheet.pixels.resize(static_cast<std::size_t>(sheet.width) * static_cast<std::size_t>(sheet.height));
-  for (std::size_t k = 0; k < sheet.sizes.size(); ++k) {
-    const GlyphSheet::Size& size = sheet.sizes[k];
-    const auto em = static_cast<FT_UInt>(
-        std::lround(static_cast<float>((k + 1) * static_cast<std::size_t>(capital_height)) / kCapitalOfEm));
-    Check(FT_Set_Pixel_Sizes(face.get(), 0, em), "scaled");
-    for (const char32_t c : characters) {
-      Check(FT_Load_Char(face.get(), c, FT_LOAD_RENDER | FT_LOAD_TARGET_LIGHT), "drawn");
-      const FT_GlyphSlot drawn = face.get()->glyph;
-      const Glyph& cell = size.glyphs.at(c);
-      for (unsigned row = 0; row < drawn->bitmap.rows; ++row) {
-        const int y = baseline[k] + drawn->bitmap_top - 1 - static_cast<int>(row);
-        for (unsigned column = 0; column < drawn->bitmap.width; ++column) {
-          const int x = drawn->bitmap_left + static_cast<int>(column);
-          if (x < 0 || x >= cell.width || y < 0 || y >= size.height) continue;  // What overhangs its cell.
-          sheet.pixels[static_cast<std::size_t>(size.y + y) * static_cast<std::size_t>(sheet.width) +
-                       static_cast<std::size_t>(cell.x + x)] =
-              drawn->bitmap.buffer[row * static_cast<unsigned>(drawn->bitmap.pitch) + column];
-        }
+    const double em = static_cast<double>(k + 1) * capital_height / kCapitalOfEm;
+    Check(FT_Set_Pixel_Sizes(face, 0, static_cast<FT_UInt>(std::lround(em))));
+    const int below = Pixels(-face->size->metrics.descender);
+    size.height = below + Pixels(face->size->metrics.ascender);
+    int x = kWidest;  // The first character begins a row.
+    for (const char32_t character : characters) {
+      const Drawn drawn = DrawCharacter(face, character);
+      if (x + drawn.width > kWidest) {
+        x = 0;
+        sheet.height += size.height;
+        sheet.pixels.resize(static_cast<std::size_t>(sheet.width) * static_cast<std::size_t>(sheet.height));
       }
+      const Glyph cell{x, sheet.height - size.height, drawn.width};
+      for (int row = 0; row < drawn.rows; ++row) {
+        const int y = below + drawn.top - 1 - row;
+        if (y < 0 || y >= size.height) continue;  // Higher than the font says of itself: none of these is.
+        std::copy_n(drawn.pixels.begin() + row * drawn.columns, drawn.columns,
+                    sheet.pixels.begin() + (cell.y + y) * sheet.width + cell.x + drawn.left);
+      }
+      size.glyphs[character] = cell;
+      x += drawn.width;
     }
   }
   return sheet;
 }
 
-int CapitalHeight(int picture_height) { return std::max(9, static_cast<int>(0.024 * picture_height)); }
+int CapitalHeight(int picture_height) { return std::max(10, static_cast<int>(0.026 * picture_height)); }
 
 std::u32string Characters(const std::string& text) {
   std::u32string characters;

@@ -9,15 +9,15 @@
 
 namespace fulcrum::render {
 
-/// Place of a character's cell on the sheet [pixels].
+/// A character's cell on the sheet: its lower left corner and its width [pixels].
 struct Glyph {
-  int x = 0, width = 0;
+  int x = 0, y = 0, width = 0;
 };
 
 /// All glyphs in two sizes, one byte per pixel (0 to 255), bottom row first.
 struct GlyphSheet {
   struct Size {
-    int y = 0, height = 0;  ///< Of the cells [pixels].
+    int height = 0;  ///< Of the cells [pixels].
     std::unordered_map<char32_t, Glyph> glyphs;
     /// The character's glyph, or that of a question mark.
     [[nodiscard]] const Glyph& Of(char32_t character) const;
@@ -29,7 +29,7 @@ struct GlyphSheet {
 /// @param capital_height of plain text [pixels].
 [[nodiscard]] GlyphSheet MakeGlyphSheet(int capital_height);
 
-/// Height of a capital in a picture of this height [pixels]: 2.4 % of it, at least 9 pixels.
+/// Height of a capital in a picture of this height [pixels]: 2.6 % of it, at least 10 pixels.
 [[nodiscard]] int CapitalHeight(int picture_height);
 
 /// Characters of a text in UTF-8; a byte that is none becomes a question mark.

@@ -70,6 +70,7 @@ struct LaparoscopeView::Impl {
   std::array<ToolSample, kMaxTools> tools{};
   bool tools_moved = true;
   Smoke smoke;
+  float haze = 0;  // As drawn.
   std::vector<std::uint8_t> serosa = MakeSerosaPattern(kSerosaTexels, look.patterns);
   Bleeding bleeding;
   Overlay overlay;
@@ -146,6 +147,7 @@ void LaparoscopeView::Impl::BindTextures() {
   state->addUniform(new osg::Uniform("atlas_per_metre", osg::Vec2(1 / size.x(), 1 / size.y())));
   state->addUniform(new osg::Uniform("light_position", vec3(scope.light_position)));
   state->addUniform(new osg::Uniform("light_axis", vec3(scope.light_axis)));
+  optics.SetLight(look.light);
   state->addUniform(new osg::Uniform("light_colour", vec3(look.light)));
   state->addUniform(new osg::Uniform("tissue_tint", vec3(look.tissue)));
   state->addUniform(wall_direction);
@@ -296,14 +298,19 @@ void LaparoscopeView::OpenVessels(const Vec2f& material, double session_time_s) 
 
 bool LaparoscopeView::UpdateEffects(double session_time_s) {
   const bool smoking = impl_->smoke.Update(session_time_s);
-  impl_->optics.SetHaze(impl_->smoke.haze());
+  impl_->haze = impl_->smoke.HazeAt(session_time_s);
+  impl_->optics.SetHaze(impl_->haze);
   const AtlasRect stained = impl_->bleeding.Update(session_time_s, impl_->layers.membrane(), &impl_->atlas);
   impl_->atlas_texture.Update(stained);
   const bool changed = smoking || !stained.empty();
   if (changed) {
     impl_->optics.SceneChanged();
   }
-  return changed || impl_->smoke.haze() > 0 || impl_->bleeding.sources() > 0 || impl_->bleeding.drops() > 0;
+  return changed || impl_->bleeding.sources() > 0 || impl_->bleeding.drops() > 0;
+}
+
+bool LaparoscopeView::HazeHasChanged(double session_time_s) const {
+  return impl_->smoke.HazeAt(session_time_s) != impl_->haze;
 }
 
 const Atlas& LaparoscopeView::atlas() const { return impl_->atlas; }

@@ -38,8 +38,10 @@ class LaparoscopeView {
   void AddSmoke(const Vec2f& material, double session_time_s);
   /// Opens the vessels at a cut at (s, t) [m]; they bleed until heat closes them.
   void OpenVessels(const Vec2f& material, double session_time_s);
-  /// Advances smoke and blood. Returns true if the picture changes or will change by that.
+  /// Advances smoke and blood. Returns true if the picture changes or will change by that, but for the haze.
   bool UpdateEffects(double session_time_s);
+  /// True if the haze of smoke is no longer that of the last UpdateEffects.
+  [[nodiscard]] bool HazeHasChanged(double session_time_s) const;
 
   /// Size of the picture [pixels], of the scene's aspect but for rounding.
   void SetSize(int width, int height);

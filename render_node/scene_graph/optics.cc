@@ -1,6 +1,7 @@
 #include "render_node/scene_graph/optics.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <osg/Geode>
@@ -79,6 +80,7 @@ Optics::Optics(const Laparoscope& scope, int width, int height, osg::Node* backg
       pixel_(new osg::Uniform("pixel", osg::Vec2())),
       soil_(new osg::Uniform("soil", 0.0f)),
       haze_(new osg::Uniform("haze", 0.0f)),
+      smoke_(new osg::Uniform("smoke", osg::Vec3())),
       clear_lens_(MakeProgram("field.vert", "field.frag")),
       smooth_lens_(MakeProgram("field.vert", "smooth.frag")),
       soiled_lens_(MakeProgram("field.vert", "soiled.frag")) {
@@ -93,6 +95,7 @@ Optics::Optics(const Laparoscope& scope, int width, int height, osg::Node* backg
   copy->addDrawable(new CopyTarget(background_, scene_));
   scene_.camera->addChild(copy);
   AddField();
+  SetLight(Vec3f::Ones());
   SetScope(scope);
   UseScale();
 }
@@ -167,7 +170,7 @@ void Optics::AddField() {
   field.state()->addUniform(pixel_);
   field.state()->addUniform(soil_);
   field.state()->addUniform(haze_);
-  field.state()->addUniform(new osg::Uniform("smoke", osg::Vec3(0.64f, 0.60f, 0.58f)));
+  field.state()->addUniform(smoke_);
   field.state()->setMode(GL_DEPTH_TEST, osg::StateAttribute::OFF);
   field.state()->setRenderBinDetails(0, "RenderBin");
   std::vector<Vec3f> positions{Vec3f::Zero()};
@@ -223,6 +226,16 @@ void Optics::SetScope(const Laparoscope& scope) {
 void Optics::SetSoil(float soil) {
   soil_->set(soil);
   UseLens();
+}
+
+void Optics::SetLight(const Vec3f& light) {
+  constexpr std::array kLitSmoke{0.30f, 0.25f, 0.228f};
+  osg::Vec3 seen;
+  for (int k = 0; k < 3; ++k) {
+    const float y = 1 / (1 + kLitSmoke.at(static_cast<std::size_t>(k)) * light[k]);
+    seen[k] = std::sqrt(1 - y * y);  // ToneMap of lighting.glsl.
+  }
+  smoke_->set(seen);
 }
 
 void Optics::UseLens() {

@@ -28,6 +28,8 @@ class Optics {
   void SetSoil(float soil);
   /// Share of the light that smoke scatters: 0 none.
   void SetHaze(float haze) { haze_->set(haze); }
+  /// Factor on the light that the camera gets.
+  void SetLight(const Vec3f& light);
   /// Must be called when the scene has changed since its last picture.
   void SceneChanged();
   [[nodiscard]] osg::Group* node() const { return node_; }
@@ -51,7 +53,8 @@ class Optics {
   int height_;
   float scale_ = 1, most_ = 1;
   osg::ref_ptr<osg::Group> node_;
-  osg::ref_ptr<osg::Uniform> circle_radius_, picture_centre_, texture_scale_, texture_most_, pixel_, soil_, haze_;
+  osg::ref_ptr<osg::Uniform> circle_radius_, picture_centre_, texture_scale_, texture_most_, pixel_, soil_, haze_,
+      smoke_;
   osg::ref_ptr<osg::Program> clear_lens_, smooth_lens_, soiled_lens_;
   osg::ref_ptr<osg::StateSet> field_state_;
   Target background_, scene_;

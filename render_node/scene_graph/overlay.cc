@@ -58,7 +58,7 @@ void Overlay::Set(std::span<const OverlayText> texts) {
         positions.emplace_back(2.0f * static_cast<float>(x + dx) / static_cast<float>(width_) - 1,
                                2.0f * static_cast<float>(y + dy) / static_cast<float>(height_) - 1, 0.0f);
         coordinates.push_back({static_cast<float>(glyph.x + dx) / static_cast<float>(sheet_.width),
-                               static_cast<float>(size.y + dy) / static_cast<float>(sheet_.height), 0, 0});
+                               static_cast<float>(glyph.y + dy) / static_cast<float>(sheet_.height), 0, 0});
         colours.push_back(text.warning ? kWarning : kText);
       }
       triangles.push_back({first, first + 1, first + 2});

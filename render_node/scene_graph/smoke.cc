@@ -16,7 +16,7 @@ constexpr float kDrift_m_s = 0.005f;
 constexpr float kFirstRadius_m = 0.0015f;
 constexpr float kGrowth_m_s = 0.0060f;
 constexpr float kOpacity = 0.50f;
-// A litre of gas every few seconds clears the cavity; cutting without a pause reaches half of the densest haze in 5 s.
+// Assumed: the gas is exchanged in 6 s. Cutting without a pause then keeps 75 puffs in it: a haze of 0.25.
 constexpr double kClears_s = 6;
 constexpr double kHalfHaze = 45;  // [puffs]
 constexpr double kDensest = 0.40;
@@ -40,17 +40,18 @@ void Smoke::Add(const Vec3f& p_W, double session_time_s) {
   next_ = (next_ + 1) % puffs_.size();
 }
 
-bool Smoke::Update(double session_time_s) {
+float Smoke::HazeAt(double session_time_s) const {
   const double puffs = puffs_in_gas_ * std::exp(std::min(0.0, last_birth_s_ - session_time_s) / kClears_s);
-  const auto haze = static_cast<float>(kHazeStep * std::floor(kDensest * puffs / (puffs + kHalfHaze) / kHazeStep));
-  const bool cleared = haze != haze_;
-  haze_ = haze;
+  return static_cast<float>(kHazeStep * std::floor(kDensest * puffs / (puffs + kHalfHaze) / kHazeStep));
+}
+
+bool Smoke::Update(double session_time_s) {
   const bool shown = shown_;
   shown_ = std::any_of(puffs_.begin(), puffs_.end(), [&](const Puff& puff) {
     return session_time_s >= puff.born_s && session_time_s - puff.born_s < kLife_s;
   });
   if (!shown && !shown_) {
-    return cleared;
+    return false;
   }
   std::vector<Vec3f> positions;
   std::vector<std::array<float, 4>> coordinates;

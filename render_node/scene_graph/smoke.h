@@ -15,11 +15,11 @@ class Smoke {
   /// Starts a puff at p_W [m], which replaces the oldest one. Calls within kLeastInterval of the last start are
   /// ignored.
   void Add(const Vec3f& p_W, double session_time_s);
-  /// Builds the squares for this time. Returns true while puffs are visible, once after the last one has disappeared,
-  /// and when the haze has changed.
+  /// Builds the squares for this time. Returns true while puffs are visible, and once after the last one has
+  /// disappeared.
   bool Update(double session_time_s);
   /// Share of the light that the smoke in the cavity scatters before it reaches the eye, in steps of 1/64: 0 clear.
-  [[nodiscard]] float haze() const { return haze_; }
+  [[nodiscard]] float HazeAt(double session_time_s) const;
   [[nodiscard]] osg::Geometry* geometry() const { return mesh_.geometry(); }
   [[nodiscard]] osg::StateSet* state() const { return mesh_.state(); }
 
@@ -34,7 +34,6 @@ class Smoke {
   bool shown_ = true;
   double last_birth_s_ = -1e9;
   double puffs_in_gas_ = 0;  // At the last birth; those that have left count in part.
-  float haze_ = 0;
   Mesh mesh_;
 };
 

@@ -17,22 +17,6 @@ namespace {
 
 using Float4 = std::array<float, 4>;
 
-Float4 SurroundingColour(SurfaceRole role) {
-  switch (role) {  // Linear colour; the last value is the share of visible fat.
-    case SurfaceRole::kAbdominalWall:
-      return {0.66f, 0.20f, 0.15f, 0.25f};
-    case SurfaceRole::kRetroperitoneum:
-      return {0.62f, 0.15f, 0.11f, 0.55f};
-    case SurfaceRole::kPelvis:
-      return {0.50f, 0.09f, 0.07f, 0.3f};
-    case SurfaceRole::kBladder:
-      return {0.70f, 0.33f, 0.25f, 0.1f};
-    case SurfaceRole::kOther:
-      break;
-  }
-  return {0.5f, 0.2f, 0.16f, 0.3f};
-}
-
 /// Adds a sphere of tissue around everything, seen from inside, as background where the scene's surfaces end.
 void AppendCavity(const SceneView& scene, std::vector<Vec3f>* positions, std::vector<Vec3f>* normals,
                   std::vector<Triangle>* triangles) {
@@ -66,6 +50,22 @@ void AppendCavity(const SceneView& scene, std::vector<Vec3f>* positions, std::ve
 }
 
 }  // namespace
+
+std::array<float, 4> SurroundingColour(SurfaceRole role) {
+  switch (role) {
+    case SurfaceRole::kAbdominalWall:
+      return {0.66f, 0.20f, 0.15f, 0.25f};
+    case SurfaceRole::kRetroperitoneum:
+      return {0.62f, 0.15f, 0.11f, 0.55f};
+    case SurfaceRole::kPelvis:
+      return {0.50f, 0.09f, 0.07f, 0.3f};
+    case SurfaceRole::kBladder:
+      return {0.70f, 0.33f, 0.25f, 0.1f};
+    case SurfaceRole::kOther:
+      break;
+  }
+  return {0.5f, 0.2f, 0.16f, 0.3f};
+}
 
 Surroundings::Surroundings(const SceneView& scene, const Laparoscope& scope) {
   AddMask(scope);

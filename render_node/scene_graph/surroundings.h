@@ -1,11 +1,15 @@
 // Rigid surroundings: the fixed surfaces of the scene, a cavity around them, and the black rim of the optics.
 #pragma once
 
+#include <array>
 #include <osg/Geode>
 
 #include "render_node/geometry/laparoscope.h"
 
 namespace fulcrum::render {
+
+/// Linear colour; the last value is the share of visible fat.
+[[nodiscard]] std::array<float, 4> SurroundingColour(SurfaceRole role);
 
 class Surroundings {
  public:

@@ -8,6 +8,7 @@
 #include "render_node/geometry/sheet_detail.h"
 #include "render_node/geometry/surface.h"
 #include "render_node/scene_graph/program.h"
+#include "render_node/scene_graph/surroundings.h"
 
 namespace fulcrum::render {
 namespace {
@@ -22,7 +23,6 @@ constexpr float kRectumBehind = 0.0025f;     // [m]
 constexpr std::size_t kMostLinePoints = 64;  // As in membrane.frag.
 // [m] Margin of the box around a planned line outside which the shader skips the line.
 constexpr float kInkReach = 0.001f;
-constexpr float kRim = 0.021f;           // [m] Width of the membrane that becomes the tissue around it.
 constexpr float kFasciaDepth = 0.0006f;  // [m] Below the peritoneum: the least depth of the fat.
 
 Vec3f EyeOf(const Laparoscope& scope) {
@@ -40,36 +40,14 @@ TissueLayers::TissueLayers(const SceneView& scene, const Laparoscope& scope)
       pixels_per_rad_(PixelsPerRad(scope)),
       membrane_(scene),
       detail_(scene.membrane),
-      fat_(scene, kFatStride) {
+      fat_(scene, kFatStride),
+      rim_(SheetRim(scene)) {
   xyz_.resize(3 * scene.rest_position.size());
   for (std::size_t i = 0; i < scene.rest_position.size(); ++i) {
     Eigen::Map<Vec3f>(xyz_.data() + 3 * i) = scene.rest_position[i];
   }
-  FindRim();
   AddRectum();
   AddSheets();
-}
-
-void TissueLayers::FindRim() {
-  const MembraneGrid& grid = scene_.membrane;
-  rim_.assign(grid.node_count(), 0.0f);
-  const bool goes_on = std::ranges::any_of(scene_.static_surfaces, [](const StaticSurface& surface) {
-    return surface.role == SurfaceRole::kRetroperitoneum;
-  });
-  if (!goes_on || grid.rows < 2 || grid.cols < 2) {
-    return;
-  }
-  const auto place = [&](std::uint32_t row, std::uint32_t col) {
-    return scene_.rest_position[grid.first + row * grid.cols + col];
-  };
-  const std::uint32_t r = grid.rows / 2, c = grid.cols / 2;
-  const float along = (place(r, c) - place(r - 1, c)).norm(), across = (place(r, c) - place(r, c - 1)).norm();
-  for (Index node = 0; node < grid.node_count(); ++node) {
-    const std::uint32_t row = node / grid.cols, col = node % grid.cols;
-    const float inside = std::min(along * static_cast<float>(std::min(row, grid.rows - 1 - row)),
-                                  across * static_cast<float>(std::min(col, grid.cols - 1 - col)));
-    rim_[node] = std::max(0.0f, 1 - inside / kRim);
-  }
 }
 
 void TissueLayers::Add(Layer* layer, const char* name, Order order, const char* fragment, const char* defined) {
@@ -115,6 +93,8 @@ void TissueLayers::AddSheets() {
   Add(&sheet_, "membrane", Order::kMembrane, "membrane.frag", printed ? "AS_PRINTED" : "");
   Blend(sheet_.mesh->state());
   sheet_.mesh->state()->addUniform(new osg::Uniform("fascia_depth", kFasciaDepth));
+  const auto around = SurroundingColour(SurfaceRole::kRetroperitoneum);
+  sheet_.mesh->state()->addUniform(new osg::Uniform("around", osg::Vec4(around[0], around[1], around[2], around[3])));
   AddPlannedLine();
 }
 

@@ -12,6 +12,7 @@
 #include "render_node/geometry/field_of_view.h"
 #include "render_node/geometry/membrane_mesh.h"
 #include "render_node/geometry/sheet_detail.h"
+#include "render_node/geometry/sheet_rim.h"
 #include "render_node/scene_graph/mesh.h"
 #include "render_node/scene_graph/order.h"
 
@@ -55,8 +56,6 @@ class TissueLayers {
   void UpdateRectum();
   void UpdateMembrane();
   void UpdateFat();
-  /// Sets rim_: 1 at the rim of a sheet that the retroperitoneum continues, 0 from 8 mm inside on.
-  void FindRim();
 
   SceneView scene_;
   FieldOfView field_;
@@ -71,7 +70,7 @@ class TissueLayers {
   std::vector<Triangle> fat_shown_;
   std::vector<float> fat_bared_;
   std::vector<Triangle> chosen_;  // Scratch: triangles of the membrane at the level of detail that is needed.
-  std::vector<float> rim_;        // Per node of the membrane's grid.
+  const std::vector<float> rim_;  // Per node of the membrane's grid (geometry/sheet_rim.h).
   bool tissue_changed_ = true, topology_changed_ = true, scope_changed_ = true;
   osg::ref_ptr<osg::Geode> geode_ = new osg::Geode;
   Layer rectum_, fat_layer_, sheet_;

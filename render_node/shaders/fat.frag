@@ -9,13 +9,16 @@ uniform vec2 atlas_per_metre;  // Atlas coordinates per metre of material.
 out vec4 fragment;
 
 const float kRelief = 3e-4; // Height of a lobule over the clefts [m].
+const float kSteepest = 1.5;
 
 // Gradient over the surface of a height above it, from its differences between neighbouring pixels.
 vec3 Slope(float height, vec3 n) {
   vec3 x = dFdx(position), y = dFdy(position);
   vec3 to_x = cross(y, n), to_y = cross(n, x);
-  float area = dot(x, to_x);
-  return (dFdx(height) * to_x + dFdy(height) * to_y) * (area / max(area * area, 1e-20));
+  float area = dot(x, to_x); // Of a pixel on the surface [m^2]; its sign is that of the side that is seen.
+  vec3 slope = (dFdx(height) * to_x + dFdy(height) * to_y) * sign(area) / max(abs(area), 1e-30);
+  // Limited, because it would become infinite for a surface that is seen edge on.
+  return slope * min(1.0, kSteepest * inversesqrt(dot(slope, slope) + 1e-12));
 }
 
 void main() {
@@ -51,5 +54,5 @@ void main() {
   alpha = mix(alpha, 0.97, bloody);
   vec3 film = normalize(mix(n, normal + 0.2 * bend, 0.5 * bloody)); // Blood fills half of a cleft.
   float gloss;
-  fragment = vec4(ToneMap(ShadeTissue(albedo, vec3(0.35, 0.25, 0.12), n, film, position, 0.8 + 0.8 * bloody, gloss)), alpha);
+  fragment = vec4(ToneMap(ShadeTissue(tissue_tint * albedo, vec3(0.35, 0.25, 0.12), n, film, position, 0.8 + 0.8 * bloody, gloss)), alpha);
 }

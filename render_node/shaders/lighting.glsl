@@ -7,7 +7,7 @@ uniform vec3 light_axis;
 uniform vec3 wall_direction; // Towards the lit wall above, which wet tissue reflects.
 uniform float light_power;   // Irradiance at 1 m; falls off with the square of the distance.
 uniform vec3 light_colour;   // Of all light that the camera gets: its white and its exposure.
-uniform vec3 tissue_tint;
+uniform vec3 tissue_tint;    // Of the light that tissue returns.
 uniform float circle_radius; // Of the round picture [pixels].
 uniform vec2 picture_centre; // [pixels]
 
@@ -33,7 +33,6 @@ float Highlight(float cosine, float broad, float sharp) {
 vec3 ShadeTissue(vec3 albedo, vec3 scatter, vec3 normal, vec3 film, vec3 position, float wet, out float gloss) {
   vec3 l;
   float e = Irradiance(position, l);
-  albedo *= tissue_tint;
   vec3 v = normalize(-position);
   float side = sign(dot(normal, v));
   vec3 diffuse = clamp((side * dot(normal, l) + scatter) / (1.0 + scatter), 0.0, 1.0);
@@ -42,6 +41,11 @@ vec3 ShadeTissue(vec3 albedo, vec3 scatter, vec3 normal, vec3 film, vec3 positio
                      Highlight(side * dot(film, normalize(wall_direction + v)), 0.07, 0.45));
   // Indirect light from the rest of the cavity is red.
   return e * (albedo * diffuse) + gloss * vec3(1.0, 0.96, 0.92) + albedo * vec3(0.030, 0.014, 0.012);
+}
+
+// What lies around the sheet. fat: its share; noise: a sample of the serosa's pattern.
+vec3 AroundTheSheet(vec3 colour, float fat, vec4 noise) {
+  return mix(colour * (0.6 + 0.8 * noise.r), vec3(0.80, 0.46, 0.16), fat * smoothstep(0.35, 0.95, noise.g));
 }
 
 // Blood is the low bits of the atlas' fourth channel (geometry/atlas.h): interpolated here, because values between

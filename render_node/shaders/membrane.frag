@@ -14,6 +14,7 @@ uniform float colour_by_temperature; // 1: the paper's eq. 15, a function of the
 uniform vec4 printed_limits;     // T_a and T_vaporization [degree C], v_vaporization, v_brown.
 uniform vec4 printed_colours[3]; // C1, C2, C3.
 #endif
+uniform vec4 around;                 // Colour of the tissue that continues the sheet, and its share of fat.
 uniform float fascia_depth;          // Below the peritoneum, along the normal [m].
 uniform mat4 osg_ProjectionMatrix;
 uniform int planned_points;            // Points of an exercise's planned line; 0: none.
@@ -76,9 +77,7 @@ void main() {
 
   // Towards its rim the sheet becomes what goes on there (surroundings.frag).
   float rim = smoothstep(0.15, 0.65, coordinate.w + 0.6 * bend.y);
-  vec3 beyond = vec3(0.62, 0.15, 0.11) * (1.0 + 0.8 * bend.x);
-  beyond = mix(beyond, vec3(0.80, 0.46, 0.16), 0.55 * smoothstep(0.35, 0.95, noise.g));
-  albedo = mix(albedo, beyond, rim);
+  albedo = mix(albedo, AroundTheSheet(around.rgb, around.a, noise), rim);
   alpha = mix(alpha, 1.0, rim);
 
   float living = 1.0 - smoothstep(0.05, 0.5, damage);
@@ -119,10 +118,12 @@ void main() {
   vec3 fascia = mix(vec3(0.86, 0.76, 0.66), vec3(0.26, 0.10, 0.035), seared);
   vec4 upper = vec4(albedo, heat.a < 0.5 ? 0.0 : alpha);
   vec4 lower = vec4(fascia, heat_below.a < 0.5 ? 0.0 : mix(0.09 + 0.30 * strand, 0.9, max(seared, tanned)));
-  // A line of sight that enters through the slit and meets the fascia has met the wall of the cut between the two.
-  float wall = heat.a < 0.5 && heat_below.a >= 0.5 ? 1.0 : 0.0;
-  vec3 raw = mix(vec3(0.80, 0.52, 0.40), vec3(0.50, 0.26, 0.11), tanned);
-  lower = mix(lower, vec4(mix(raw, vec3(0.13, 0.05, 0.02), seared), 0.97), wall);
+  // A line of sight that enters through the slit of the nearer layer and meets the farther one has met the wall of the
+  // cut between the two.
+  bool from_above = dot(normal, position) < 0.0;
+  vec4 raw = vec4(mix(mix(vec3(0.80, 0.52, 0.40), vec3(0.50, 0.26, 0.11), tanned), vec3(0.13, 0.05, 0.02), seared), 0.97);
+  if (from_above && heat.a < 0.5) lower = raw;
+  if (!from_above && heat_below.a < 0.5) upper = raw;
 #ifdef AS_PRINTED
   float v = clamp((celsius - printed_limits.x) / (printed_limits.y - printed_limits.x), 0.0, 1.0);
   int which = v > printed_limits.z ? 0 : v > printed_limits.w ? 1 : 2;
@@ -130,7 +131,6 @@ void main() {
   lower.a = 0.001; // One layer; not 0, by which the mean of both would be divided where v is 1.
   wet *= 1.0 - v;
 #endif
-  bool from_above = dot(normal, position) < 0.0;
   vec4 near = from_above ? upper : lower, far = from_above ? lower : upper;
   float through = (1.0 - near.a) * far.a, both = near.a + through;
   albedo = (near.a * near.rgb + through * far.rgb) / both;
@@ -138,6 +138,6 @@ void main() {
 
   // Highlights are opaque.
   float gloss;
-  vec3 shaded = ShadeTissue(albedo, vec3(0.30, 0.16, 0.10), n, film, position, wet, gloss);
+  vec3 shaded = ShadeTissue(tissue_tint * albedo, vec3(0.30, 0.16, 0.10), n, film, position, wet, gloss);
   fragment = vec4(ToneMap(shaded), min(both + 0.8 * gloss, 1.0) * (1.0 - smoothstep(0.93, 1.0, coordinate.w)));
 }

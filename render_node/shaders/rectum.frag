@@ -17,5 +17,5 @@ void main() {
   vec3 albedo = mix(vec3(0.52, 0.070, 0.060), vec3(0.72, 0.20, 0.15), clamp(0.5 + 1.8 * bend.x, 0.0, 1.0));
   albedo = mix(albedo, vec3(0.26, 0.008, 0.014), 0.5 * vessel);
   float gloss;
-  fragment = vec4(ToneMap(ShadeTissue(albedo, vec3(0.32, 0.08, 0.07), n, film, position, 0.8, gloss)), 1.0);
+  fragment = vec4(ToneMap(ShadeTissue(tissue_tint * albedo, vec3(0.32, 0.08, 0.07), n, film, position, 0.8, gloss)), 1.0);
 }

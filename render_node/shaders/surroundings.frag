@@ -15,9 +15,8 @@ void main() {
   vec3 bend = noise.rgb - 0.5;
   vec3 n = normalize(normal + 0.15 * bend);
   vec3 film = normalize(normal + 0.5 * bend);
-  vec3 albedo = colour.rgb * (1.0 + 0.8 * bend.x);
-  albedo = mix(albedo, vec3(0.80, 0.46, 0.16), colour.a * smoothstep(0.35, 0.95, noise.g));
+  vec3 albedo = AroundTheSheet(colour.rgb, colour.a, noise);
   albedo = mix(albedo, vec3(0.34, 0.015, 0.02), 0.45 * vessel);
   float gloss;
-  fragment = vec4(ToneMap(ShadeTissue(albedo, vec3(0.28, 0.10, 0.08), n, film, position, 0.7 - 0.68 * coordinate.w, gloss)), 1.0);
+  fragment = vec4(ToneMap(ShadeTissue(tissue_tint * albedo, vec3(0.28, 0.10, 0.08), n, film, position, 0.7 - 0.68 * coordinate.w, gloss)), 1.0);
 }

@@ -150,7 +150,7 @@ DatasetResult MakeDataset(const DatasetSettings& settings, const SceneView& scen
   DatasetResult all;
   std::string said;
   for (std::uint32_t i = 0; i < settings.variations; ++i) {
-    const Variation variation = VariationOf(scene.render, settings.seed, i);
+    const Variation variation = VariationOf(scene, settings.seed, i);
     SceneView varied = scene;
     varied.render = variation.camera;
     DatasetSettings one = settings;
@@ -159,7 +159,7 @@ DatasetResult MakeDataset(const DatasetSettings& settings, const SceneView& scen
     all.frames += result.frames;
     all.duration_s = result.duration_s;
     // A set of variations that was interrupted names those that are whole.
-    said += VariationText(i, variation);
+    said += VariationText(settings.seed, i, variation);
     WriteText(settings.folder / "variations.jsonl", said);
   }
   return all;

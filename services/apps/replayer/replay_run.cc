@@ -119,8 +119,10 @@ int RunDataset(const Options& options) {
   const DatasetResult result = MakeDataset(settings, scene.view(), BeginFiles(progress));
   progress.Clear();
   const std::filesystem::path first = options.dataset_variations > 0 ? options.dataset / "000" : options.dataset;
-  std::cout << options.dataset.string() << ": " << result.frames << " frames, " << result.duration_s << " s; look at "
-            << (first / "sheet.png").string() << '\n';
+  std::cout << options.dataset.string() << ": "
+            << (options.dataset_variations > 0 ? std::to_string(options.dataset_variations) + " data sets, " : "")
+            << result.frames << " frames, " << result.duration_s << " s; look at " << (first / "sheet.png").string()
+            << '\n';
   if (!options.json.empty()) {
     WriteText(options.json, Format("{\n  \"frames\": %llu,\n  \"duration_s\": %.3f\n}\n",
                                    static_cast<unsigned long long>(result.frames), result.duration_s));

@@ -1,5 +1,6 @@
 #include "services/apps/replayer/variation.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -9,11 +10,11 @@
 namespace fulcrum::replay {
 namespace {
 
-constexpr float kTarget_m = 0.004f, kTurn_deg = 10, kRoll_deg = 12;
+constexpr float kTarget_m = 0.004f, kTurn_rad = std::numbers::pi_v<float> / 18, kRoll_deg = 12;
 constexpr float kDistance = 0.10f, kField = 0.10f;  // Shares.
 constexpr float kDarkest = 0.6f, kBrightest = 1.5f;
-constexpr float kWhite = 0.12f, kTint = 0.15f;  // Shares.
-constexpr float kWidest_deg = 120;
+constexpr float kWhite = 0.12f, kTint = 0.15f;               // Shares.
+constexpr float kLeastField_deg = 10, kMostField_deg = 150;  // As of a scene.
 
 /// The standard fixes the sequence of std::mt19937 but not those of its distributions.
 class Draw {
@@ -32,39 +33,46 @@ class Draw {
 
 }  // namespace
 
-Variation VariationOf(const RenderParams& camera, std::uint32_t seed, std::uint32_t index) {
+Variation VariationOf(const SceneView& scene, std::uint32_t seed, std::uint32_t index) {
+  const RenderParams& camera = scene.render;
   Draw draw(seed, index);
-  Variation variation{{}, camera};
+  Variation variation{{}, camera, !FindTool(scene.tools, ToolKind::kScope)};
   const float strength = std::exp(draw.Between(std::log(kDarkest), std::log(kBrightest)));
-  variation.look.light = strength * Vec3f(1 + draw.Around(kWhite), 1, 1 + draw.Around(kWhite));
+  const float red = 1 + draw.Around(kWhite), blue = 1 + draw.Around(kWhite);
+  variation.look.light = strength * Vec3f(red, 1, blue);
   for (int k = 0; k < 3; ++k) variation.look.tissue[k] = 1 + draw.Around(kTint);
   variation.look.patterns = draw.Number();
 
   RenderParams& moved = variation.camera;
+  moved.fov_deg = std::clamp(camera.fov_deg * (1 + draw.Around(kField)), kLeastField_deg, kMostField_deg);
+  if (!variation.scope_varies) return variation;
   for (int k = 0; k < 3; ++k) moved.scope_target_W[k] += draw.Around(kTarget_m);
   const Vec3f back = camera.scope_tip_W - camera.scope_target_W;
-  const auto angle = [&] { return std::numbers::pi_v<float> / 180 * draw.Around(kTurn_deg); };
-  // About the vertical and about the horizontal line across the view.
+  const float sideways = draw.Around(kTurn_rad), upward = draw.Around(kTurn_rad);
   const Vec3f across = back.cross(Vec3f::UnitZ());
-  Vec3f turned = Eigen::AngleAxisf(angle(), Vec3f::UnitZ()) * back;
-  if (across.norm() > 1e-6f) turned = Eigen::AngleAxisf(angle(), across.normalized()) * turned;
+  Vec3f turned = back;
+  if (across.norm() > 1e-6f) turned = Eigen::AngleAxisf(upward, across.normalized()) * turned;
+  turned = Eigen::AngleAxisf(sideways, Vec3f::UnitZ()) * turned;
   moved.scope_tip_W = moved.scope_target_W + (1 + draw.Around(kDistance)) * turned;
   moved.roll_deg += draw.Around(kRoll_deg);
-  moved.fov_deg = std::min(kWidest_deg, camera.fov_deg * (1 + draw.Around(kField)));
   return variation;
 }
 
-std::string VariationText(std::uint32_t index, const Variation& variation) {
+std::string VariationText(std::uint32_t seed, std::uint32_t index, const Variation& variation) {
   const auto vector = [](const Vec3f& v) {
     return Format("[%.6f, %.6f, %.6f]", static_cast<double>(v.x()), static_cast<double>(v.y()),
                   static_cast<double>(v.z()));
   };
-  return Format("{\"folder\": \"%03u\", \"patterns\": %u, \"light\": ", index, variation.look.patterns) +
-         vector(variation.look.light) + ", \"tissue\": " + vector(variation.look.tissue) +
-         ", \"scope_tip_W\": " + vector(variation.camera.scope_tip_W) +
-         ", \"scope_target_W\": " + vector(variation.camera.scope_target_W) +
-         Format(", \"roll_deg\": %.4f, \"fov_deg\": %.4f}\n", static_cast<double>(variation.camera.roll_deg),
-                static_cast<double>(variation.camera.fov_deg));
+  const RenderParams& camera = variation.camera;
+  const std::string pose = variation.scope_varies
+                               ? "\"scope_tip_W\": " + vector(camera.scope_tip_W) +
+                                     ", \"scope_target_W\": " + vector(camera.scope_target_W) +
+                                     Format(", \"roll_deg\": %.4f", static_cast<double>(camera.roll_deg))
+                               : "\"scope_tip_W\": null, \"scope_target_W\": null, \"roll_deg\": null";
+  return Format("{\"folder\": \"%03u\", \"seed\": %u, \"patterns\": %u, \"light\": ", index, seed,
+                variation.look.patterns) +
+         vector(variation.look.light) + ", \"tissue\": " + vector(variation.look.tissue) + ", " + pose +
+         Format(", \"fov_deg\": %.4f}\n", static_cast<double>(camera.fov_deg));
 }
 
 }  // namespace fulcrum::replay

@@ -13,7 +13,7 @@ std::pair<int, int> Extent(const GlyphSheet& sheet, const GlyphSheet::Size& size
   int low = size.height, high = -1;
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < glyph.width; ++x) {
-      if (sheet.pixels[static_cast<std::size_t>((size.y + y) * sheet.width + glyph.x + x)] > 127) {
+      if (sheet.pixels[static_cast<std::size_t>((glyph.y + y) * sheet.width + glyph.x + x)] > 127) {
         low = std::min(low, y);
         high = std::max(high, y);
       }
@@ -22,10 +22,10 @@ std::pair<int, int> Extent(const GlyphSheet& sheet, const GlyphSheet::Size& size
   return {low, high};
 }
 
-TEST(FontTest, TextIsAShareOfThePictureAndNeverSmallerThanNinePixels) {
-  EXPECT_EQ(CapitalHeight(240), 9);
-  EXPECT_EQ(CapitalHeight(540), 12);
-  EXPECT_EQ(CapitalHeight(2160), 51);
+TEST(FontTest, TextIsAShareOfThePictureAndNeverSmallerThanTenPixels) {
+  EXPECT_EQ(CapitalHeight(240), 10);
+  EXPECT_EQ(CapitalHeight(540), 14);
+  EXPECT_EQ(CapitalHeight(2160), 56);
 }
 
 TEST(FontTest, ACapitalHasTheHeightThatWasAskedForInBothSizes) {
@@ -39,14 +39,23 @@ TEST(FontTest, ACapitalHasTheHeightThatWasAskedForInBothSizes) {
   }
 }
 
+TEST(FontTest, TheSheetFitsIntoATextureAtAnySizeOfThePicture) {
+  for (const int capital : {9, 51, CapitalHeight(7680)}) {
+    const GlyphSheet sheet = MakeGlyphSheet(capital);
+    EXPECT_LE(sheet.width, 4096);
+    EXPECT_LE(sheet.height, 8192);
+    EXPECT_EQ(sheet.pixels.size(), static_cast<std::size_t>(sheet.width) * static_cast<std::size_t>(sheet.height));
+  }
+}
+
 TEST(FontTest, FiguresAreOfOneWidthSoThatTheyStandStill) {
   const GlyphSheet sheet = MakeGlyphSheet(12);
   for (char32_t c = U'0'; c <= U'9'; ++c) EXPECT_EQ(sheet.sizes[0].Of(c).width, sheet.sizes[0].Of(U'0').width);
-  EXPECT_EQ(sheet.sizes[0].Of(U'■').width, sheet.sizes[0].Of(U'□').width) << "the bar of a force";
+  EXPECT_EQ(sheet.sizes[0].Of(U'▮').width, sheet.sizes[0].Of(U'▯').width) << "the bar of a force";
 }
 
 TEST(FontTest, UnknownCharactersAndBrokenUtf8BecomeQuestionMarks) {
-  EXPECT_EQ(Characters("37 °C ■"), U"37 °C ■");
+  EXPECT_EQ(Characters("37 °C ▮"), U"37 °C ▮");
   EXPECT_EQ(Characters("a\xff\xe2\x96"), U"a???");
   EXPECT_EQ(Characters("\xc2"), U"?");
   const GlyphSheet sheet = MakeGlyphSheet(12);

@@ -4,7 +4,6 @@
 //
 // The scenes are those beside the recordings (scene.fulcrum). RECORDING is of the script of built-in, at least 24 s.
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -98,7 +97,7 @@ class Sheet {
       const render::Glyph& glyph = size.Of(character);
       for (int row = 0; row < size.height; ++row) {
         for (int column = 0; column < glyph.width; ++column) {
-          const int from = (size.y + row) * glyphs_.width + glyph.x + column;
+          const int from = (glyph.y + row) * glyphs_.width + glyph.x + column;
           std::fill_n(&all_.rgb[Offset(all_.width, x + column, bottom + row)], 3,
                       glyphs_.pixels[static_cast<std::size_t>(from)]);
         }

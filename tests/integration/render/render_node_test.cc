@@ -115,10 +115,10 @@ TEST(HudTest, TheBarIsFullAtTheHighestForceAllowedAndAWarningAbove) {
   const auto bar = [&](const std::string& text) {
     return std::find_if(texts.begin(), texts.end(), [&](const OverlayText& t) { return t.text == text; });
   };
-  ASSERT_NE(bar("L ■■■■■■■■■■ 4.0 N"), texts.end());
-  EXPECT_FALSE(bar("L ■■■■■■■■■■ 4.0 N")->warning);
-  ASSERT_NE(bar("R ■■■■■■■■■■ 7.7 N"), texts.end());
-  EXPECT_TRUE(bar("R ■■■■■■■■■■ 7.7 N")->warning);
+  ASSERT_NE(bar("L ▮▮▮▮▮▮▮▮▮▮ 4.0 N"), texts.end());
+  EXPECT_FALSE(bar("L ▮▮▮▮▮▮▮▮▮▮ 4.0 N")->warning);
+  ASSERT_NE(bar("R ▮▮▮▮▮▮▮▮▮▮ 7.7 N"), texts.end());
+  EXPECT_TRUE(bar("R ▮▮▮▮▮▮▮▮▮▮ 7.7 N")->warning);
 }
 
 TEST_F(RenderNodeTest, ShowsTheForceOfTheTissueAndNotThatOnTheHand) {

@@ -1,0 +1,14 @@
+// Where the membrane ends in tissue: sides of the sheet that the retroperitoneum continues. Pure.
+#pragma once
+
+#include <vector>
+
+#include "services/base/core/scene_view.h"
+
+namespace fulcrum::render {
+
+/// For each node of the membrane's grid: 1 on a side that continues, falling to 0 at 21 mm from it, or at a third of
+/// the sheet if that is less. A side continues if the retroperitoneum is within 3 mm of most of it.
+[[nodiscard]] std::vector<float> SheetRim(const SceneView& scene);
+
+}  // namespace fulcrum::render
