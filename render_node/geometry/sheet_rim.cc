@@ -10,7 +10,7 @@ namespace {
 
 constexpr float kRim_m = 0.021f;
 constexpr float kNear_m = 0.003f;
-constexpr std::uint32_t kSamples = 16;  // Of a side.
+constexpr std::uint32_t kSamplesOfASide = 16;
 
 }  // namespace
 
@@ -33,11 +33,11 @@ std::vector<float> SheetRim(const SceneView& scene) {
   const std::uint32_t last_row = grid.rows - 1, last_col = grid.cols - 1;
   const auto goes_on = [&](const auto& place_at, std::uint32_t last) {
     std::uint32_t near = 0;
-    for (std::uint32_t k = 0; k < kSamples; ++k) {
-      const Vec3f p = place_at(k * last / (kSamples - 1));
+    for (std::uint32_t k = 0; k < kSamplesOfASide; ++k) {
+      const Vec3f p = place_at(k * last / (kSamplesOfASide - 1));
       near += (nearest.Find(p).At(vertices) - p).norm() < kNear_m ? 1 : 0;
     }
-    return 2 * near > kSamples;
+    return 2 * near > kSamplesOfASide;
   };
   const bool before_rows = goes_on([&](std::uint32_t at) { return place(0, at); }, last_col);
   const bool after_rows = goes_on([&](std::uint32_t at) { return place(last_row, at); }, last_col);
