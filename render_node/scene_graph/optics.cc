@@ -43,29 +43,29 @@ class DrawnOnce : public osg::Camera::DrawCallback {
 /// Copies the background, colour and depth, before the scene is drawn.
 class Optics::CopyTarget : public osg::Drawable {
  public:
-  CopyTarget(const Target& from, const Target& to) : from_(from), to_(to) {
+  CopyTarget(const Target& from, const Target& to)
+      : from_{from.colour, from.depth}, to_{to.colour, to.depth}, camera_(to.camera) {
     setUseDisplayList(false);
     setCullingActive(false);
     DrawIn(Order::kBackground, getOrCreateStateSet());
   }
   CopyTarget() = default;
   CopyTarget(const CopyTarget& other, const osg::CopyOp& copy_op)
-      : osg::Drawable(other, copy_op), from_(other.from_), to_(other.to_) {}
+      : osg::Drawable(other, copy_op), from_(other.from_), to_(other.to_), camera_(other.camera_) {}
   META_Object(fulcrum, CopyTarget);
 
   void drawImplementation(osg::RenderInfo& info) const override {
-    const osg::Viewport* area = to_.camera->getViewport();
+    const osg::Viewport* area = camera_->getViewport();
     const unsigned context = info.getContextID();
-    const auto copy = [&](const osg::Texture2D& from, const osg::Texture2D& to) {
-      CopyTexture(from.getTextureObject(context)->id(), to.getTextureObject(context)->id(),
+    for (std::size_t k = 0; k < from_.size(); ++k) {
+      CopyTexture(from_[k]->getTextureObject(context)->id(), to_[k]->getTextureObject(context)->id(),
                   static_cast<int>(area->width()), static_cast<int>(area->height()));
-    };
-    copy(*from_.colour, *to_.colour);
-    copy(*from_.depth, *to_.depth);
+    }
   }
 
  private:
-  Target from_, to_;
+  std::array<osg::ref_ptr<osg::Texture2D>, 2> from_, to_;  // Colour, depth.
+  const osg::Camera* camera_ = nullptr;                    // Owns this: a reference would keep both for good.
 };
 
 Optics::Optics(const Laparoscope& scope, int width, int height, osg::Node* background, osg::Node* scene)

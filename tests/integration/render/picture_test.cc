@@ -6,6 +6,10 @@
 #include <cstdlib>
 #include <functional>
 #include <numeric>
+#include <osg/Camera>
+#include <osg/NodeVisitor>
+#include <osg/observer_ptr>
+#include <vector>
 
 #include "render_node/geometry/solid.h"
 #include "render_node/offscreen/png_writer.h"
@@ -99,6 +103,28 @@ TEST_F(PictureTest, ShowsPinkTissueInARoundField) {
   EXPECT_GT(middle.r, 90);
   EXPECT_GT(middle.r, 1.15 * middle.g);
   EXPECT_GT(middle.r, 1.15 * middle.b);
+}
+
+/// A data set of a hundred variations builds a hundred views, and a film one for each step back.
+TEST_F(PictureTest, LeavesNothingBehind) {
+  class Cameras : public osg::NodeVisitor {
+   public:
+    Cameras() : osg::NodeVisitor(TRAVERSE_ALL_CHILDREN) { setNodeMaskOverride(~0u); }  // They rest when drawn.
+    void apply(osg::Camera& camera) override {
+      found.emplace_back(&camera);
+      traverse(camera);
+    }
+    std::vector<osg::observer_ptr<osg::Camera>> found;
+  } cameras;
+  {
+    LaparoscopeView laparoscope(view_);
+    const auto display = MakeOffscreenDisplay(laparoscope, view_.render);
+    Bitmap picture;
+    display->DrawAndRead(&picture);
+    laparoscope.root()->accept(cameras);
+  }
+  EXPECT_GE(cameras.found.size(), 2u);
+  for (const auto& camera : cameras.found) EXPECT_FALSE(camera.valid());
 }
 
 TEST_F(PictureTest, IsTheSameEveryTime) {
