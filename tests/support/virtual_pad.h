@@ -9,6 +9,21 @@
 
 namespace fulcrum::testing {
 
+/// Keeps SDL's gamepads started. Two threads may not start them at once: make this before what reads gamepads on a
+/// thread of its own.
+class StartedPads {
+ public:
+  StartedPads() {
+    SDL_SetHint(SDL_HINT_JOYSTICK_HIDAPI, "0");
+    SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
+    SDL_SetMainReady();
+    if (SDL_InitSubSystem(SDL_INIT_GAMECONTROLLER) != 0) throw std::runtime_error(SDL_GetError());
+  }
+  ~StartedPads() { SDL_QuitSubSystem(SDL_INIT_GAMECONTROLLER); }
+  StartedPads(const StartedPads&) = delete;
+  StartedPads& operator=(const StartedPads&) = delete;
+};
+
 class VirtualPad {
  public:
   /// Plugs it in. SDL's joysticks must have been started, or are. @param known SDL knows its layout.

@@ -64,6 +64,7 @@ class WindowPad : public ::testing::Test {
     return input_->state().gamepad == there;
   }
 
+  testing::StartedPads pads_;
   testing::VirtualScreen screen_;
   std::unique_ptr<testing::BareWindow> window_;
   Received received_;
