@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "services/base/core/utf8.h"
+
 // The file is part of the program, so that a picture needs nothing that is not installed.
 asm(".section .rodata\n"
     ".global fulcrum_font_begin, fulcrum_font_end\n"
@@ -111,22 +113,12 @@ int CapitalHeight(int picture_height) { return std::max(10, static_cast<int>(0.0
 std::u32string Characters(const std::string& text) {
   std::u32string characters;
   for (std::size_t i = 0; i < text.size();) {
-    const auto byte = [&](std::size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0u; };
-    const auto follows = [&](std::size_t k) { return (byte(k) & 0xc0u) == 0x80u; };
-    const unsigned first = byte(i);
-    if (first < 0x80) {
-      characters += static_cast<char32_t>(first);
-      i += 1;
-    } else if ((first & 0xe0u) == 0xc0u && follows(i + 1)) {
-      characters += static_cast<char32_t>((first & 0x1fu) << 6 | (byte(i + 1) & 0x3fu));
-      i += 2;
-    } else if ((first & 0xf0u) == 0xe0u && follows(i + 1) && follows(i + 2)) {
-      characters += static_cast<char32_t>((first & 0x0fu) << 12 | (byte(i + 1) & 0x3fu) << 6 | (byte(i + 2) & 0x3fu));
-      i += 3;
-    } else {
-      characters += U'?';
-      i += 1;
-    }
+    const std::size_t length = Utf8Length(text, i);
+    char32_t code = length == 0 ? U'?' : static_cast<unsigned char>(text[i]);
+    if (length > 1) code &= 0x7fu >> length;
+    for (std::size_t j = 1; j < length; ++j) code = code << 6 | (static_cast<unsigned char>(text[i + j]) & 0x3fu);
+    characters += code;
+    i += std::max<std::size_t>(1, length);
   }
   return characters;
 }
