@@ -1,5 +1,7 @@
 #include "services/apps/scene_compiler/arguments.h"
 
+#include <charconv>
+
 #include "services/base/core/error.h"
 
 namespace fulcrum::scene_compiler {
@@ -7,14 +9,17 @@ namespace {
 
 constexpr const char* kUsage =
     R"(usage: scene_compiler SCENE.yaml --out FILE [options]
-       scene_compiler --info FILE
+       scene_compiler --new NAME --from MESH [--unit U] [--at X,Y,Z] [--facing X,Y,Z] [--out FILE.yaml]
+       scene_compiler --info FILE [--preview FILE.png]
        scene_compiler --source FILE
        scene_compiler --list [DIR]
 
-Compiles a scene description into the file that the nodes map, then reports its quality.
+Compiles a scene description into the file that the nodes map, then reports its quality. With --new, first writes a
+description around a mesh: membrane, tools, scope and a script that grasps and cuts, sized to the organ.
 
-Example:
+Examples:
   scene_compiler deploy/scenes/small.yaml --out small.fulcrum --set physics.grip_force_N=4
+  scene_compiler --new liver --from liver.stl     writes liver.yaml and liver.png; then: fulcrum up liver.yaml
 
 Options:
   --out FILE               compiled scene to write
@@ -23,6 +28,13 @@ Options:
   --set SECTION.KEY=VALUE  replace a parameter of physics, thermal, haptics, breathing or render in the description,
                            script.power_W (the power of all uses of the generator), or script.hand (expert, novice) and
                            script.seed: performs the script; may be repeated
+  --preview FILE.png       draw the compiled scene from four sides
+  --limit SECONDS          give up after this time (default: 120)
+  --new NAME               write NAME.yaml (or --out) and the picture NAME.png beside it
+  --from MESH              the organ: .stl, .obj, .off, .ply, .vtk, .vtp, .vtu, .msh, TetGen
+  --unit U                 of the mesh: m, cm, mm, um (default: the one in which it has the size of an organ)
+  --at X,Y,Z               the middle of the membrane, in mm in the frame of the mesh (default: found)
+  --facing X,Y,Z           direction from the organ to the membrane, in the frame of the mesh (default: found)
   --quiet                  print no progress and no report
   --info FILE              print the content and quality of a compiled scene
   --source FILE            print the effective YAML of a compiled scene
@@ -32,6 +44,15 @@ Options:
 Keys of a description: services/scene/README.md.
 Exit code: 0 done, 1 failure, 2 bad usage or input, 3 a compiled scene of another version.
 )";
+
+double Seconds(const std::string& text) {
+  double seconds = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seconds);
+  if (error != std::errc() || end != text.data() + text.size() || !(seconds >= 1 && seconds <= 86400)) {
+    throw InputError("--limit '" + text + "'; valid: 1 to 86400 seconds");
+  }
+  return seconds;
+}
 
 }  // namespace
 
@@ -59,6 +80,20 @@ Arguments ParseArguments(const std::vector<std::string>& words) {
       arguments.info = value();
     } else if (word == "--source") {
       arguments.source = value();
+    } else if (word == "--preview") {
+      arguments.preview = value();
+    } else if (word == "--limit") {
+      arguments.limit_s = Seconds(value());
+    } else if (word == "--new") {
+      arguments.new_name = value();
+    } else if (word == "--from") {
+      arguments.from = value();
+    } else if (word == "--unit") {
+      arguments.unit = value();
+    } else if (word == "--at") {
+      arguments.at_mm = value();
+    } else if (word == "--facing") {
+      arguments.facing = value();
     } else if (word == "--list") {
       arguments.list = true;
     } else if (word == "--quiet") {

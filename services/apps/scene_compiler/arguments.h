@@ -9,7 +9,9 @@ namespace fulcrum::scene_compiler {
 struct Arguments {
   std::vector<std::string> plain;    ///< Words without an option: the description; for --list a folder.
   std::vector<std::string> changes;  ///< Values of --set, each "section.key=value".
-  std::string out, data, info, source;
+  std::string out, data, info, source, preview;
+  std::string new_name, from, unit, at_mm, facing;  ///< A new scene: its name, its mesh, and what the user says of it.
+  double limit_s = 120;
   bool list = false, quiet = false, help = false;
 };
 

@@ -1,47 +1,188 @@
 #include "services/apps/scene_compiler/commands.h"
 
+#include <algorithm>
+#include <cctype>
+#include <charconv>
 #include <chrono>
+#include <condition_variable>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
+#include <mutex>
+#include <optional>
 #include <string>
+#include <thread>
 
 #include "services/base/core/error.h"
+#include "services/base/core/exit_code.h"
 #include "services/base/runtime/install_places.h"
 #include "services/scene/builder/quality.h"
 #include "services/scene/compiler/compile.h"
+#include "services/scene/compiler/new_scene.h"
+#include "services/scene/compiler/preview.h"
 #include "services/scene/compiler/scene_yaml.h"
 #include "services/scene/format/scene_file.h"
 
 namespace fulcrum::scene_compiler {
 namespace {
 
-void List(const std::filesystem::path& folder) {
+namespace fs = std::filesystem;
+
+void List(const fs::path& folder) {
   for (const scene::SceneSummary& summary : scene::ListScenes(folder)) {
     std::cout << summary.name << "\t" << summary.file.string() << "\t" << summary.description << "\n";
   }
 }
 
+/// Prints each stage with the time since the start.
+class Stages {
+ public:
+  explicit Stages(bool quiet) : quiet_(quiet) {}
+
+  void Say(const std::string& text) const {
+    if (!quiet_) std::fprintf(stderr, "%6.2f s  %s\n", seconds(), text.c_str());
+  }
+  [[nodiscard]] scene::Progress progress() const {
+    return [this](const std::string& text) { Say(text); };
+  }
+  [[nodiscard]] double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+ private:
+  bool quiet_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// Ends the program when its time is over: a mesher has no bound of its own.
+class Limit {
+ public:
+  explicit Limit(double seconds)
+      : watch_([this, seconds] {
+          std::unique_lock lock(mutex_);
+          if (!wake_.wait_for(lock, std::chrono::duration<double>(seconds), [&] { return done_; })) {
+            std::fprintf(stderr,
+                         "scene_compiler: gave up after %g s. A simpler surface, fewer `target_tets` or a larger "
+                         "`min_edge_mm` take less; --limit SECONDS permits more\n",
+                         seconds);
+            std::_Exit(static_cast<int>(ExitCode::kBadUsage));
+          }
+        }) {}
+  ~Limit() {
+    {
+      const std::lock_guard lock(mutex_);
+      done_ = true;
+    }
+    wake_.notify_one();
+    watch_.join();
+  }
+  Limit(const Limit&) = delete;
+  Limit& operator=(const Limit&) = delete;
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool done_ = false;
+  std::thread watch_;
+};
+
+void WriteFile(const fs::path& file, const std::string& bytes) {
+  std::ofstream out(file, std::ios::binary);
+  if (!out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())).flush()) {
+    throw InputError(file.string() + ": cannot be written");
+  }
+}
+
+/// Runs `work`; what fails at a place of the geometry is drawn into `picture`.
+template <class Work>
+void ShowingFaults(const fs::path& picture, const Work& work) {
+  try {
+    work();
+  } catch (const scene::SpotError& error) {
+    WriteFile(picture, scene::PictureOf(error.spot()));
+    throw InputError(std::string(error.what()) + "; the place is drawn in " + picture.string());
+  }
+}
+
+/// "1,-2.5,3".
+std::optional<Vec3d> PointOf(const std::string& option, const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  Vec3d point;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (int k = 0; k < 3; ++k) {
+    const auto [next, error] = std::from_chars(at, end, point[k]);
+    if (error != std::errc() || (k < 2 ? next == end || *next != ',' : next != end)) {
+      throw InputError(option + " '" + text + "'; valid: three numbers as in 10,-2.5,40");
+    }
+    at = next + 1;
+  }
+  return point;
+}
+
+void Preview(const SceneView& view, const std::string& file) {
+  if (!file.empty()) WriteFile(file, scene::PreviewOf(view));
+}
+
 void Compile(const Arguments& arguments) {
-  if (arguments.plain.size() != 1 || arguments.out.empty()) {
+  if (arguments.plain.size() != 1 || (arguments.out.empty() && arguments.preview.empty())) {
     throw InputError("SCENE.yaml or --out FILE is missing, or there is more than one SCENE.yaml; see --help");
   }
-  const auto start = std::chrono::steady_clock::now();
-  const auto seconds = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
-  const auto progress = [&](const std::string& text) {
+  const Stages stages(arguments.quiet);
+  const Limit limit(arguments.limit_s);
+  const fs::path fault = fs::path(arguments.out.empty() ? arguments.preview : arguments.out).replace_extension(".fault.png");
+  ShowingFaults(fault, [&] {
+    const scene::CompiledScene compiled =
+        scene::CompileScene(arguments.plain[0], arguments.data, stages.progress(), arguments.changes);
+    Preview(compiled.data.View(), arguments.preview);
+    if (arguments.out.empty()) return;
+    stages.Say("writing " + arguments.out);
+    scene::WriteSceneFile(compiled.data, compiled.effective_yaml, arguments.out);
+    const scene::SceneFile written(arguments.out);  // Reads the file back with all checks that a node makes.
     if (!arguments.quiet) {
-      std::fprintf(stderr, "%6.2f s  %s\n", seconds(), text.c_str());
+      stages.Say("done: scene '" + std::string(written.view().name) + "'");
+      std::cout << scene::Describe(written.view(), scene::Measure(written.view()));
     }
-  };
-  const scene::CompiledScene compiled =
-      scene::CompileScene(arguments.plain[0], arguments.data, progress, arguments.changes);
-  progress("writing " + arguments.out);
-  scene::WriteSceneFile(compiled.data, compiled.effective_yaml, arguments.out);
-  const scene::SceneFile written(arguments.out);  // Reads the file back with all checks that a node makes.
-  if (!arguments.quiet) {
-    std::fprintf(stderr, "%6.2f s  done: scene '%s'\n", seconds(), written.view().name);
-    std::cout << scene::Describe(written.view(), scene::Measure(written.view()));
+  });
+}
+
+void MakeNew(const Arguments& arguments) {
+  if (arguments.from.empty() || !arguments.plain.empty()) {
+    throw InputError("--new NAME needs --from MESH and nothing else; see --help");
   }
+  const std::string& name = arguments.new_name;
+  const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.'; };
+  if (name.empty() || name.size() > 63 || !std::all_of(name.begin(), name.end(), is_plain) || name[0] == '.') {
+    throw InputError("--new '" + name + "'; valid: up to 63 letters, digits, '-', '_' and '.'");
+  }
+  const fs::path yaml = arguments.out.empty() ? name + ".yaml" : arguments.out;
+  if (fs::exists(yaml)) {
+    throw InputError(yaml.string() + " is there already; remove it, or give another name or --out");
+  }
+  const Stages stages(arguments.quiet);
+  const Limit limit(arguments.limit_s);
+  const fs::path folder = yaml.has_parent_path() ? yaml.parent_path() : ".";
+  const scene::NewScene wanted{name,
+                               arguments.from,
+                               fs::proximate(arguments.from, folder).string(),
+                               arguments.unit,
+                               PointOf("--at", arguments.at_mm),
+                               PointOf("--facing", arguments.facing)};
+  ShowingFaults(fs::path(yaml).replace_extension(".fault.png"), [&] {
+    WriteFile(yaml, scene::DescribeNewScene(wanted, stages.progress()));
+    stages.Say("wrote " + yaml.string());
+    const scene::CompiledScene compiled = scene::CompileScene(yaml, {}, stages.progress());
+    const fs::path picture = fs::path(yaml).replace_extension(".png");
+    Preview(compiled.data.View(), picture);
+    stages.Say("drew " + picture.string());
+    if (!arguments.quiet) {
+      std::cout << scene::Describe(compiled.data.View(), scene::Measure(compiled.data.View()))
+                << "\nNext: look at " << picture.string() << ", then\n  fulcrum up " << yaml.string()
+                << "\n  fulcrum up " << yaml.string() << " --window --hands mouse   to operate it yourself\n";
+    }
+  });
 }
 
 }  // namespace
@@ -52,10 +193,13 @@ void Run(const Arguments& arguments) {
   } else if (!arguments.info.empty()) {
     const scene::SceneFile file(arguments.info);
     std::cout << "scene '" << file.view().name << "'\n" << scene::Describe(file.view(), scene::Measure(file.view()));
+    Preview(file.view(), arguments.preview);
+  } else if (!arguments.new_name.empty()) {
+    MakeNew(arguments);
   } else if (!arguments.source.empty()) {
     std::cout << scene::SceneFile(arguments.source).source_yaml();
   } else if (arguments.list) {
-    List(arguments.plain.empty() ? runtime::ShareFolder() / "scenes" : std::filesystem::path(arguments.plain[0]));
+    List(arguments.plain.empty() ? runtime::ShareFolder() / "scenes" : fs::path(arguments.plain[0]));
   } else {
     Compile(arguments);
   }

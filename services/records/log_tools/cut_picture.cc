@@ -5,10 +5,14 @@
 #include <cmath>
 #include <cstdio>
 
-#include "services/records/log_tools/canvas.h"
+#include "services/base/picture/canvas.h"
 
 namespace fulcrum::log_tools {
 namespace {
+
+using picture::Canvas;
+using picture::Mix;
+using picture::Rgb;
 
 constexpr Rgb kPaper{255, 255, 255}, kInk{25, 32, 40}, kSoft{120, 130, 140}, kHole{20, 20, 24}, kIsland{0, 230, 60},
     kMetal{30, 110, 255}, kIdleMetal{170, 190, 215}, kTouched{120, 190, 255}, kCurrent{255, 40, 160},

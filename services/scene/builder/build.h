@@ -18,6 +18,7 @@ struct Anatomy {
   std::vector<Vec3d> surface_vertices;  ///< High-resolution surface, to be embedded.
   std::vector<Triangle> surface_triangles;
   std::vector<Vec3d> sheet;  ///< Membrane nodes, row by row.
+  bool is_patch = false;     ///< The sheet covers a patch, not a stretch of a tube.
   struct Surrounding {
     std::string name;
     SurfaceRole role;

@@ -34,7 +34,8 @@ struct TubeSettings {
 
 /// The organ read from a mesh: its tetrahedra unchanged, or a surface that is filled with tetrahedra (without `wall_m`
 /// wall and lumen are one body). The membrane covers a stretch of the organ's centre line, on the side from which it is
-/// dissected.
+/// dissected, or a patch of its surface. Without `centreline_m` the importer finds line or patch, and the middle of the
+/// membrane becomes the origin of frame W.
 struct ImportSettings {
   double scale_m = 0.001;          ///< Metres per unit of the files.
   Vec3f origin_m = Vec3f::Zero();  ///< Point in the frame of the files that becomes the origin of frame W.
@@ -46,11 +47,16 @@ struct ImportSettings {
   double tet_edge_m = 0;            ///< > 0: tetrahedra of about this mean edge instead of `target_tets`.
   double min_edge_m = 0.0003;       ///< Shorter edges of the surface are slivers and are collapsed.
   int organ_triangles_max = 14000;  ///< The embedded surface is decimated to this many triangles.
-  /// The organ's centre line, caudal end first, in the frame of the files [m].
+  /// The organ's centre line, caudal end first, in the frame of the files [m]; empty: found.
   std::vector<Vec3f> centreline_m;
+  bool patch = false;  ///< The membrane covers a patch, whether or not the organ is a tube.
+  std::optional<Vec3f> patch_at_m;                 ///< Its middle, in the frame of the files; none: found.
+  double patch_width_m = 0, patch_length_m = 0;    ///< 0: most of the organ as seen from outside.
   /// The stretch under the membrane, as fractions of the centre line's length; beyond it the organ is fixed.
   double from = 0.1, to = 0.9;
-  Vec3f facing = Vec3f::UnitZ();  ///< Direction from the centre line to the middle of the membrane.
+  /// Direction from the organ to the middle of the membrane, in the frame of the files; none: found, or z with a given
+  /// centre line.
+  std::optional<Vec3f> facing;
   double sector_rad = 2.2;        ///< Angle around the organ over which the membrane follows it.
   double flare_m = 0.010;         ///< Length by which the membrane then continues away from the organ on either side.
   double bed_m = 0.025;           ///< Length of a fixed surface that continues it on either side.

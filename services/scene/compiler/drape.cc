@@ -4,8 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "services/base/core/error.h"
 #include "services/scene/builder/geometry.h"
+#include "services/scene/compiler/sheet_grid.h"
+#include "services/scene/compiler/spot.h"
 
 namespace fulcrum::scene {
 namespace {
@@ -18,46 +19,6 @@ constexpr int kRadiusSmoothing = 12, kSheetSmoothing = 40;
 constexpr double kTaper = 0.12;  ///< Share of the length at either end over which the gap decreases to …
 constexpr double kEndGap = 0.3;  ///< … this share of it: there the membrane is fused with the organ.
 constexpr double kFlareTurn_rad = 0.7;
-constexpr double kLeastNormalAgreement = 0.05;  ///< Cosine between neighbouring normals: a smaller one means a fold.
-
-/// Rows of values on a regular grid.
-template <class T>
-struct Grid {
-  int rows, cols;
-  std::vector<T> values;
-
-  Grid(int r, int c, const T& value) : rows(r), cols(c), values(static_cast<std::size_t>(r) * c, value) {}
-  T& at(int r, int c) { return values[static_cast<std::size_t>(r) * cols + c]; }
-  const T& at(int r, int c) const { return values[static_cast<std::size_t>(r) * cols + c]; }
-
-  /// Bilinear at fractions in [0, 1].
-  [[nodiscard]] T Sample(double row, double col) const {
-    const double y = row * (rows - 1), x = col * (cols - 1);
-    const int r = std::clamp(static_cast<int>(y), 0, rows - 2), c = std::clamp(static_cast<int>(x), 0, cols - 2);
-    const double v = y - r, u = x - c;
-    return (1 - v) * ((1 - u) * at(r, c) + u * at(r, c + 1)) + v * ((1 - u) * at(r + 1, c) + u * at(r + 1, c + 1));
-  }
-
-  /// Moves each value half way to the mean of its neighbours, `times` times. Border values have fewer neighbours, or
-  /// are kept.
-  void Smooth(int times, bool keep_border) {
-    for (int k = 0; k < times; ++k) {
-      const Grid old = *this;
-      for (int r = 0; r < rows; ++r) {
-        for (int c = 0; c < cols; ++c) {
-          if (keep_border && (r == 0 || c == 0 || r == rows - 1 || c == cols - 1)) {
-            continue;
-          }
-          T sum = old.at(std::max(r - 1, 0), c);
-          sum += old.at(std::min(r + 1, rows - 1), c);
-          sum += old.at(r, std::max(c - 1, 0));
-          sum += old.at(r, std::min(c + 1, cols - 1));
-          at(r, c) = 0.5 * old.at(r, c) + 0.125 * sum;
-        }
-      }
-    }
-  }
-};
 
 struct CrossFrame {
   Vec3d centre, right, up;
@@ -100,26 +61,29 @@ double ExitDistance(const TriangleMesh& mesh, const Vec3d& origin, const Vec3d& 
   return hit ? nearest : -1;
 }
 
-Grid<double> OuterRadius(const ImportSettings& import, const CentreLine& line, const TriangleMesh& organ,
-                         const std::string& name) {
+Grid<double> OuterRadius(const ImportSettings& import, const CentreLine& line, const Vec3d& facing,
+                         const TriangleMesh& organ, const std::string& name) {
   Grid<double> radius(kRadiusRows, kRadiusAngles, -1.0);
   int missed = 0;
   double mean = 0;
+  Vec3d outside = Vec3d::Zero();
   for (int r = 0; r < kRadiusRows; ++r) {
     const double fraction = import.from + (import.to - import.from) * r / (kRadiusRows - 1);
-    const CrossFrame frame = FrameAt(line, fraction, import.facing.cast<double>());
+    const CrossFrame frame = FrameAt(line, fraction, facing);
     for (int a = 0; a < kRadiusAngles; ++a) {
       const double angle = (static_cast<double>(a) / (kRadiusAngles - 1) - 0.5) * import.sector_rad;
       const double distance = ExitDistance(organ, frame.centre, frame.Direction(angle));
       radius.at(r, a) = distance;
       missed += distance < 0 ? 1 : 0;
+      if (distance < 0) outside = frame.centre;
       mean += std::max(distance, 0.0);
     }
   }
   if (missed > kMissedRays * kRadiusRows * kRadiusAngles) {
-    throw InputError(name + ": " + std::to_string(100 * missed / (kRadiusRows * kRadiusAngles)) +
+    throw SpotError(name + ": " + std::to_string(100 * missed / (kRadiusRows * kRadiusAngles)) +
                      " % of the rays from the centre line do not leave the organ; valid: at most " +
-                     std::to_string(static_cast<int>(100 * kMissedRays)) + " %. The centre line must run inside it");
+                     std::to_string(static_cast<int>(100 * kMissedRays)) + " %. The centre line must run inside it",
+                    {{organ}, outside});
   }
   mean /= kRadiusRows * kRadiusAngles - missed;
   for (double& value : radius.values) {
@@ -127,25 +91,6 @@ Grid<double> OuterRadius(const ImportSettings& import, const CentreLine& line, c
   }
   radius.Smooth(kRadiusSmoothing, false);
   return radius;
-}
-
-/// `count` equally spaced points along a polyline.
-std::vector<Vec3d> Resample(const std::vector<Vec3d>& line, int count) {
-  std::vector<double> length{0};
-  for (std::size_t i = 1; i < line.size(); ++i) {
-    length.push_back(length.back() + (line[i] - line[i - 1]).norm());
-  }
-  std::vector<Vec3d> result;
-  std::size_t k = 0;
-  for (int i = 0; i < count; ++i) {
-    const double wanted = length.back() * i / (count - 1);
-    while (k + 2 < length.size() && length[k + 1] < wanted) {
-      ++k;
-    }
-    const double f = std::clamp((wanted - length[k]) / (length[k + 1] - length[k]), 0.0, 1.0);
-    result.push_back((1 - f) * line[k] + f * line[k + 1]);
-  }
-  return result;
 }
 
 /// One row before resampling: flare, arc over the organ, flare.
@@ -176,72 +121,6 @@ std::vector<Vec3d> RowLine(const CrossFrame& frame, const Grid<double>& radius, 
   const std::vector<Vec3d> right = flare(arc.back(), (arc.back() - arc[kArc - kArc / 10]).normalized(), 1);
   line.insert(line.end(), right.begin(), right.end());
   return line;
-}
-
-Vec3d NormalAt(const Grid<Vec3d>& sheet, int r, int c) {
-  const Vec3d across = sheet.at(r, std::min(c + 1, sheet.cols - 1)) - sheet.at(r, std::max(c - 1, 0));
-  const Vec3d along = sheet.at(std::min(r + 1, sheet.rows - 1), c) - sheet.at(std::max(r - 1, 0), c);
-  return across.cross(along).normalized();
-}
-
-/// Moves nodes that are nearer to the organ than `least_gap(row)` outwards along the surface's normal.
-template <class LeastGap>
-void PushOut(const TriangleMesh& organ, const TriangleLocator& locator, double reach, const LeastGap& least_gap,
-             Grid<Vec3d>* sheet) {
-  for (int r = 0; r < sheet->rows; ++r) {
-    for (int c = 0; c < sheet->cols; ++c) {
-      Vec3d& p = sheet->at(r, c);
-      const auto hit = locator.Closest(p, reach);
-      if (hit.triangle == kNoIndex) {
-        continue;
-      }
-      const Triangle& t = organ.triangles[hit.triangle];
-      const Vec3d &a = organ.vertices[t[0]], &b = organ.vertices[t[1]], &d = organ.vertices[t[2]];
-      const Vec3d normal = (b - a).cross(d - a).normalized();
-      const double height = normal.dot(p - hit.closest.point);
-      const double distance = std::copysign(hit.closest.distance, height);
-      if (distance < least_gap(r)) {
-        p += (least_gap(r) - distance) * normal;
-      }
-    }
-  }
-}
-
-/// Spaces the nodes evenly along each row, then along each column.
-void Spread(Grid<Vec3d>* sheet) {
-  std::vector<Vec3d> line;
-  for (int r = 0; r < sheet->rows; ++r) {
-    line.assign(sheet->values.begin() + static_cast<std::ptrdiff_t>(r) * sheet->cols,
-                sheet->values.begin() + static_cast<std::ptrdiff_t>(r + 1) * sheet->cols);
-    line = Resample(line, sheet->cols);
-    std::copy(line.begin(), line.end(), sheet->values.begin() + static_cast<std::ptrdiff_t>(r) * sheet->cols);
-  }
-  for (int c = 0; c < sheet->cols; ++c) {
-    line.clear();
-    for (int r = 0; r < sheet->rows; ++r) {
-      line.push_back(sheet->at(r, c));
-    }
-    line = Resample(line, sheet->rows);
-    for (int r = 0; r < sheet->rows; ++r) {
-      sheet->at(r, c) = line[r];
-    }
-  }
-}
-
-/// Throws at a fold, which is a crease of more than 90 degrees between neighbouring nodes.
-void CheckFolds(const Grid<Vec3d>& sheet, const std::vector<CrossFrame>& frames, const std::string& name) {
-  for (int r = 0; r < sheet.rows; ++r) {
-    for (int c = 0; c < sheet.cols; ++c) {
-      const Vec3d normal = NormalAt(sheet, r, c);
-      const bool outward = c != sheet.cols / 2 || normal.dot(frames[r].up) > kLeastNormalAgreement;
-      if (!outward || !(normal.dot(NormalAt(sheet, r, std::min(c + 1, sheet.cols - 1))) > kLeastNormalAgreement) ||
-          !(normal.dot(NormalAt(sheet, std::min(r + 1, sheet.rows - 1), c)) > kLeastNormalAgreement)) {
-        throw InputError(name + ": the membrane folds over at row " + std::to_string(r) + ", column " +
-                         std::to_string(c) +
-                         ". Choose a shorter stretch, another facing, or a smaller sector or flare");
-      }
-    }
-  }
 }
 
 }  // namespace
@@ -296,19 +175,20 @@ double CentreLine::Project(const Vec3d& p) const {
 // ------------------------------------------------------------------------------------------------------- drape
 
 std::vector<Vec3d> DrapeMembrane(const ImportSettings& import, const MembraneSettings& membrane,
-                                 const CentreLine& centre_line, const TriangleMesh& organ, const std::string& name) {
-  const Grid<double> radius = OuterRadius(import, centre_line, organ, name);
-  Grid<Vec3d> sheet(membrane.rows, membrane.cols, Vec3d::Zero());
+                                 const CentreLine& centre_line, const Vec3d& facing, const TriangleMesh& organ,
+                                 const std::string& name) {
+  const Grid<double> radius = OuterRadius(import, centre_line, facing, organ, name);
+  SheetGrid sheet(membrane.rows, membrane.cols, Vec3d::Zero());
   std::vector<CrossFrame> frames;
-  const auto gap = [&](int r) {
+  const auto gap = [&](int r, int) {
     const double t = static_cast<double>(r) / (membrane.rows - 1);
     const double x = std::clamp(std::min(t, 1 - t) / kTaper, 0.0, 1.0);
     return membrane.gap_m * (kEndGap + (1 - kEndGap) * x * x * (3 - 2 * x));
   };
   for (int r = 0; r < membrane.rows; ++r) {
     const double t = static_cast<double>(r) / (membrane.rows - 1);
-    frames.push_back(FrameAt(centre_line, import.from + (import.to - import.from) * t, import.facing.cast<double>()));
-    const std::vector<Vec3d> row = Resample(RowLine(frames.back(), radius, t, gap(r), import), membrane.cols);
+    frames.push_back(FrameAt(centre_line, import.from + (import.to - import.from) * t, facing));
+    const std::vector<Vec3d> row = Resample(RowLine(frames.back(), radius, t, gap(r, 0), import), membrane.cols);
     for (int c = 0; c < membrane.cols; ++c) {
       sheet.at(r, c) = row[c];
     }
@@ -320,7 +200,9 @@ std::vector<Vec3d> DrapeMembrane(const ImportSettings& import, const MembraneSet
     PushOut(organ, locator, 2 * membrane.gap_m, gap, &sheet);
     Spread(&sheet);
   }
-  CheckFolds(sheet, frames, name);
+  CheckFolds(
+      sheet, organ, [&](int r) { return frames[static_cast<std::size_t>(r)].up; }, name,
+      "Choose a shorter stretch, another facing, or a smaller sector or flare");
   return sheet.values;
 }
 

@@ -32,7 +32,14 @@ class CentreLine {
 /// The membrane's nodes, row by row [m]: all outside the organ, columns along +(tangent x facing), rows along the
 /// centre line. Throws InputError "name: reason" when rays from the centre line miss the organ or the sheet folds over.
 std::vector<Vec3d> DrapeMembrane(const ImportSettings& import, const MembraneSettings& membrane,
-                                 const CentreLine& centre_line, const TriangleMesh& organ, const std::string& name);
+                                 const CentreLine& centre_line, const Vec3d& facing, const TriangleMesh& organ,
+                                 const std::string& name);
+
+/// The nodes of a membrane over a patch of the organ, seen along -z: a rectangle of `width` x `length` [m] around the
+/// origin, which spans hollows and steep sides as a taut sheet would and is fused with the organ at its rim. Columns
+/// along +x, rows along +y. Throws InputError "name: reason".
+std::vector<Vec3d> DrapePatch(double width, double length, const MembraneSettings& membrane, const TriangleMesh& organ,
+                              const std::string& name);
 
 /// The fixed surface that continues a membrane on both sides by `width`, beginning slightly below its rims.
 TriangleMesh ContinueSideways(int rows, int cols, const std::vector<Vec3d>& sheet, double width);

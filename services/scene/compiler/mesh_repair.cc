@@ -15,10 +15,12 @@
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_stop_predicate.h>
 #include <CGAL/Surface_mesh_simplification/edge_collapse.h>
+#include <CGAL/alpha_wrap_3.h>
 #include <CGAL/boost/graph/Euler_operations.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 #include <set>
 
@@ -170,6 +172,42 @@ void RemoveSlivers(double min_edge, Surface* surface, RepairReport* report) {
   }
 }
 
+/// Fewer triangles than these are enough for any organ; more only take time.
+void Thin(Surface* surface) {
+  constexpr std::size_t kMany = 120000, kEnough = 60000;
+  if (surface->number_of_faces() > kMany) {
+    sms::edge_collapse(*surface, sms::Count_stop_predicate<Surface>(kEnough * 3 / 2));
+    surface->collect_garbage();
+  }
+}
+
+/// "72 open edges in 2 openings, the longest around (1, 2, 3) mm", in the frame of the organ.
+std::string OpeningsOf(const Surface& surface, Vec3d* place) {
+  std::vector<Surface::Halfedge_index> cycles;
+  pmp::extract_boundary_cycles(surface, std::back_inserter(cycles));
+  std::size_t edges = 0, longest = 0;
+  for (const auto start : cycles) {
+    std::size_t count = 0;
+    Vec3d sum = Vec3d::Zero();
+    auto h = start;
+    do {
+      const auto& p = surface.point(surface.target(h));
+      sum += Vec3d(p.x(), p.y(), p.z());
+      ++count;
+      h = surface.next(h);
+    } while (h != start);
+    edges += count;
+    if (count > longest) {
+      longest = count;
+      *place = sum / static_cast<double>(count);
+    }
+  }
+  char text[160];
+  std::snprintf(text, sizeof(text), "%zu open edges in %zu opening%s, the longest around (%.3g, %.3g, %.3g) mm", edges,
+                cycles.size(), cycles.size() == 1 ? "" : "s", 1e3 * place->x(), 1e3 * place->y(), 1e3 * place->z());
+  return text;
+}
+
 /// Closes every hole with triangles between its own vertices. Returns the number of holes closed.
 std::size_t CapOpenings(Surface* surface) {
   std::vector<Surface::Halfedge_index> holes;
@@ -245,7 +283,35 @@ TriangleMesh WithWall(const TriangleMesh& outer, double thickness) {
   return wall;
 }
 
+/// Share of the area that one piece must have to stand for the whole file.
+constexpr double kMainPiece = 0.7;
+
+TriangleMesh Wrapped(const TriangleMesh& mesh, RepairReport* report) {
+  report->is_wrapped = true;
+  TriangleMesh wrap = WrapSurface(mesh);
+  MeasureShape(wrap, report);
+  return wrap;
+}
+
 }  // namespace
+
+TriangleMesh WrapSurface(const TriangleMesh& mesh) {
+  // Details and openings smaller than this share of the box's diagonal disappear, and the wrap lies outside by a
+  // twentieth of that.
+  constexpr double kShare = 1.0 / 80, kOffsetShare = 0.05;
+  Vec3d low = mesh.vertices[0], high = low;
+  std::vector<Kernel::Point_3> points;
+  for (const Vec3d& p : mesh.vertices) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+    points.emplace_back(p.x(), p.y(), p.z());
+  }
+  const double alpha = kShare * (high - low).norm();
+  Surface wrap;
+  CGAL::alpha_wrap_3(points, mesh.triangles, alpha, kOffsetShare * alpha, wrap);
+  pmp::keep_largest_connected_components(wrap, 1);
+  return ToMesh(&wrap);
+}
 
 TriangleMesh RepairSurface(const TriangleMesh& mesh, const SurfaceRepair& settings, const std::string& name,
                            RepairReport* report) {
@@ -253,18 +319,24 @@ TriangleMesh RepairSurface(const TriangleMesh& mesh, const SurfaceRepair& settin
   if (surface.number_of_faces() == 0) {
     throw InputError(name + ": no triangle with an area");
   }
+  Thin(&surface);
+  const double whole = pmp::area(surface);
   report->pieces_dropped = pmp::keep_largest_connected_components(surface, 1);
   surface.collect_garbage();
+  // Parts that overlap or triangles that do not meet are one body only when they are wrapped.
+  const bool is_piecemeal = pmp::area(surface) < kMainPiece * whole;
+  if (is_piecemeal && !(settings.wall > 0)) return Wrapped(mesh, report);
   if (settings.cap_openings) {
     report->openings_capped = CapOpenings(&surface);
   }
   if (!CGAL::is_closed(surface) && !(settings.wall > 0)) {
-    std::size_t open = 0;
-    for (const auto e : surface.edges()) {
-      open += surface.is_border(e) ? 1 : 0;
-    }
-    throw InputError(name + ": the surface is not closed (" + std::to_string(open) +
-                     " open edges); `cap_openings: true` closes its holes, `wall_mm` makes it a wall");
+    if (settings.cap_openings) return Wrapped(ToMesh(&surface), report);
+    Spot spot;
+    const std::string openings = OpeningsOf(surface, &spot.place);
+    spot.meshes = {ToMesh(&surface)};
+    throw OpenSurfaceError(name + ": the surface is not closed (" + openings +
+                               "); `cap_openings: true` closes its holes, `wall_mm` makes it a wall",
+                           std::move(spot));
   }
   RemoveSlivers(settings.min_edge, &surface, report);
   OrientOutward(name, &surface);
@@ -279,6 +351,7 @@ TriangleMesh RepairSurface(const TriangleMesh& mesh, const SurfaceRepair& settin
                      " pairs of triangles); choose a thinner wall, or a smoother or coarser surface");
   }
   if (!CGAL::is_closed(surface) || !CGAL::is_valid_polygon_mesh(surface)) {
+    if (!(settings.wall > 0)) return Wrapped(ToMesh(&surface), report);
     throw InputError(name + ": cannot be repaired to a closed surface");
   }
   TriangleMesh repaired = ToMesh(&surface);

@@ -3,9 +3,16 @@
 
 #include <string>
 
+#include "services/scene/compiler/spot.h"
 #include "services/scene/readers/mesh_io.h"
 
 namespace fulcrum::scene {
+
+/// The surface has openings, and nothing says how to close them.
+class OpenSurfaceError : public SpotError {
+ public:
+  using SpotError::SpotError;
+};
 
 struct SurfaceRepair {
   double min_edge = 0;        ///< Shorter edges are collapsed.
@@ -21,13 +28,19 @@ struct RepairReport {
   /// Remaining pairs of intersecting triangles: tolerated by the mesher, reported.
   std::size_t self_intersections = 0;
   double least_edge = 0, least_angle_deg = 0;  ///< After the repair.
+  bool is_wrapped = false;                     ///< The result is a wrap (WrapSurface).
 };
 
 /// The largest piece of `mesh` as a closed, outward-oriented two-manifold without short edges and without needle or cap
-/// triangles where its topology allows. Throws InputError "name: reason" if it cannot be closed, or if the inner side
-/// of the wall intersects itself.
+/// triangles where its topology allows, of at most 120,000 triangles. What stays open or in pieces is wrapped. Throws
+/// OpenSurfaceError if the surface is open and `settings` do not say how to close it, or if the inner side of
+/// the wall intersects itself.
 TriangleMesh RepairSurface(const TriangleMesh& mesh, const SurfaceRepair& settings, const std::string& name,
                            RepairReport* report);
+
+/// The closed surface around all triangles, free of crossings, whatever their faults: an alpha wrap (Portaneri et al.
+/// 2022). Details below an eightieth of the size disappear.
+TriangleMesh WrapSurface(const TriangleMesh& mesh);
 
 /// Edge collapse (Lindstrom, Turk 1998) down to `triangles_max`; pieces and holes remain. Orientation is made
 /// consistent.

@@ -39,7 +39,7 @@ const StrictMap::Choices<SurfaceRole> kRoles = {{"abdominal_wall", SurfaceRole::
 const StrictMap::Choices<std::uint32_t> kPedals = {
     {"up", kPedalNone}, {"cut", kPedalCut}, {"coag", kPedalCoag}, {"blend", kPedalBlend}};
 const StrictMap::Choices<BrickSplit> kSplits = {{"six", BrickSplit::kSix}, {"five", BrickSplit::kFive}};
-const StrictMap::Choices<double> kLengthUnits = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}};
+const StrictMap::Choices<double> kLengthUnits = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}, {"um", 1e-6}};
 
 void ReadTube(StrictMap map, TubeSettings* t) {
   ReadInteger(&map, "rings", 3, 1000, &t->rings);
@@ -95,12 +95,19 @@ void ReadCentreline(StrictMap map, std::vector<Vec3f>* points) {
   }
 }
 
+void ReadPatch(StrictMap map, ImportSettings* import) {
+  import->patch = true;
+  if (map.Has("at_mm")) import->patch_at_m = map.Vector3Si("at_mm", Range::Between(-5000, 5000));
+  if (map.Has("width_mm")) import->patch_width_m = map.NumberSi("width_mm", Range::Between(5, 400));
+  if (map.Has("length_mm")) import->patch_length_m = map.NumberSi("length_mm", Range::Between(5, 400));
+}
+
 void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Folders* folders) {
   for (const std::string& folder : map.Texts("folders", 0, 16)) {
     for (const auto& base : bases) folders->push_back(base / folder);
   }
   folders->insert(folders->end(), bases.begin(), bases.end());
-  import->scale_m = map.Choice("unit", import->scale_m, kLengthUnits);
+  import->scale_m = map.Choice("unit", import->scale_m, kLengthUnits) * map.Number("scale", 1, Range::Between(1e-3, 1e3));
   import->origin_m = map.Vector3Si("origin_mm", import->origin_m, Range::Between(-2000, 2000));
   import->organ_file = FindFile(map, "organ", map.Text("organ"), *folders);
   import->remesh = map.Flag("remesh", import->remesh);
@@ -113,15 +120,23 @@ void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Fol
   ReadSi(&map, "tet_edge_mm", Range::Between(0, 50), &import->tet_edge_m);
   ReadSi(&map, "min_edge_mm", Range::Between(0, 5), &import->min_edge_m);
   ReadInteger(&map, "organ_triangles_max", 500, 200000, &import->organ_triangles_max);
-  ReadCentreline(map.Map("centreline"), &import->centreline_m);
+  if (auto line = map.OptionalMap("centreline")) ReadCentreline(*line, &import->centreline_m);
+  if (auto patch = map.OptionalMap("patch")) {
+    if (!import->centreline_m.empty()) {
+      map.Fail("patch", "and centreline exclude each other: the membrane covers a stretch of the organ or a patch of it");
+    }
+    ReadPatch(*patch, import);
+  }
   ReadSi(&map, "from", Range::Between(0, 1), &import->from);
   ReadSi(&map, "to", Range::Between(0, 1), &import->to);
   if (!(import->to - import->from >= 0.1)) {
     map.Fail("to", "must exceed `from` by at least 0.1");
   }
-  import->facing = map.Vector3Si("facing", import->facing, Range::Between(-1, 1));
-  if (!(import->facing.norm() > 0.1)) {
-    map.Fail("facing", "must be a direction, not (nearly) zero");
+  if (map.Has("facing")) {
+    import->facing = map.Vector3Si("facing", Range::Between(-1, 1));
+    if (!(import->facing->norm() > 0.1)) {
+      map.Fail("facing", "must be a direction, not (nearly) zero");
+    }
   }
   ReadSi(&map, "sector_deg", Range::Between(30, 240), &import->sector_rad);
   ReadSi(&map, "flare_mm", Range::Between(0, 60), &import->flare_m);
@@ -354,6 +369,13 @@ SceneDescription ReadFile(const std::filesystem::path& file, const std::filesyst
 SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data,
                                const std::vector<std::string>& changes) {
   return ReadFile(file, data, changes, true);
+}
+
+double LengthUnit(const std::string& name) {
+  for (const auto& [unit, metres] : kLengthUnits) {
+    if (unit == name) return metres;
+  }
+  throw InputError("unit '" + name + "'; valid: m, cm, mm, um");
 }
 
 std::vector<config::KeyRule> SceneRules(const std::filesystem::path& file) {

@@ -26,6 +26,9 @@ SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::fil
 /// directory.
 SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, const std::filesystem::path& data);
 
+/// Metres per unit m, cm, mm or um. Throws InputError for another one.
+double LengthUnit(const std::string& name);
+
 /// Every key that a description can have. Its mesh files need not exist.
 std::vector<config::KeyRule> SceneRules(const std::filesystem::path& file);
 

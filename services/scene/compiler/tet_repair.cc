@@ -42,8 +42,7 @@ class TetRepair {
 
  private:
   [[noreturn]] void Refuse(const Numbered& t, const std::string& reason) const {
-    throw InputError(name_ + ": tetrahedron " + std::to_string(t.number) + " at " + Place(X(t.tet[0])) + ": " + reason +
-                     ". `remesh: true` fills the surface anew instead");
+    throw FlawError(name_ + ": tetrahedron " + std::to_string(t.number) + " at " + Place(X(t.tet[0])) + ": " + reason);
   }
 
   const Vec3d& X(Index v) const { return file_.vertices[v]; }

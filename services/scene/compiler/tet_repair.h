@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "services/base/core/error.h"
 #include "services/scene/readers/mesh_io.h"
 
 namespace fulcrum::scene {
@@ -21,8 +22,14 @@ struct TetRepairReport {
   double least_dihedral_deg = 0, largest_dihedral_deg = 0;
 };
 
+/// A fault of the tetrahedra that only filling their surface anew mends.
+class FlawError : public InputError {
+ public:
+  using InputError::InputError;
+};
+
 /// The largest piece of the file's tetrahedra, turned to positive volume, as a mesh in which every face belongs to one
-/// or two tetrahedra on opposite sides of it; vertices and tetrahedra sorted by place. Throws InputError "name:
+/// or two tetrahedra on opposite sides of it; vertices and tetrahedra sorted by place. Throws FlawError "name:
 /// tetrahedron 12 ...: reason" for faults that cannot be repaired: flat tetrahedra (a dihedral angle below 1 degree),
 /// overlapping ones, faces with three.
 TetrahedralMesh RepairTetrahedra(const MeshFile& file, const std::string& name, TetRepairReport* report);

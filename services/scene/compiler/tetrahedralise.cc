@@ -30,6 +30,7 @@ constexpr int kAttempts = 6;
 /// Bounds of the exponent when the last two attempts do not determine it.
 constexpr double kLeastOrder = 1, kLargestOrder = 5;
 constexpr double kCountTolerance = 0.1;
+constexpr double kLeastShare = 0.6;  ///< Of the count, where no attempt is within the tolerance.
 constexpr double kSliverBound_deg = 15;
 /// Distance of the mesh from the surface, as a share of the cell size. The fine surface is embedded, so the picture
 /// does not depend on this.
@@ -106,6 +107,8 @@ TetrahedralMesh Tetrahedralise(const TriangleMesh& mesh, int target_tets, const 
   // count ~ size^-order: 3 in a thick body; in a wall of one layer the last two attempts determine it.
   double order = 3, last_size = 0;
   std::size_t last_count = 0;
+  Complex nearest;
+  double nearest_ratio = 0;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     CGAL::Random random(kSeed);
     CGAL::get_default_random() = CGAL::Random(kSeed);
@@ -133,8 +136,14 @@ TetrahedralMesh Tetrahedralise(const TriangleMesh& mesh, int target_tets, const 
     if (std::abs(ratio - 1) <= kCountTolerance) {
       return ToMesh(complex);
     }
+    if (nearest_ratio == 0 || std::abs(std::log(ratio)) < std::abs(std::log(nearest_ratio))) {
+      nearest = complex;
+      nearest_ratio = ratio;
+    }
     size *= std::pow(ratio, 1 / order);
   }
+  // In a thin body the count jumps where a layer comes in.
+  if (nearest_ratio > kLeastShare && nearest_ratio < 1 / kLeastShare) return ToMesh(nearest);
   throw InputError(name + ": gives " + std::to_string(last_count) + " tetrahedra after " + std::to_string(kAttempts) +
                    " attempts; wanted: " + std::to_string(target_tets) +
                    ". A thin body needs more of them; try another number");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <string>
 
 #include "services/scene/builder/geometry.h"
@@ -61,24 +62,32 @@ MeshFile ParseTetgen(std::string_view bytes, const std::filesystem::path& name, 
 MeshFile Choose(std::string_view bytes, const std::filesystem::path& name, const CompanionFiles& companions) {
   const std::string text = name.string(), extension = LowerExtension(name);
   const std::string_view head = bytes.substr(0, std::min<std::size_t>(bytes.size(), 512));
-  if (extension == ".stl") {
-    return ReadStl(bytes, text);  // First, because the 80 bytes before the count of a binary STL can have any content.
+  // Content before extension, since files are renamed. But the 80 bytes before the count of a binary STL can have any
+  // content.
+  if (extension == ".stl" && IsBinaryStl(bytes)) {
+    return ReadStl(bytes, text);
   }
-  if (head.starts_with("$MeshFormat") || head.starts_with("$NOD") || head.starts_with("$Comments") ||
-      extension == ".msh") {
+  if (head.starts_with("$MeshFormat") || head.starts_with("$NOD") || head.starts_with("$Comments")) {
     return ReadGmsh(bytes, text);
   }
-  if (head.starts_with("# vtk DataFile") || extension == ".vtk") {
+  if (head.starts_with("# vtk DataFile")) {
     return ReadVtk(bytes, text);
   }
-  if (head.find("<VTKFile") != std::string_view::npos || extension == ".vtu") {
+  if (head.find("<VTKFile") != std::string_view::npos) {
     return ReadVtu(bytes, text);
   }
-  if (head.starts_with("ply\n") || head.starts_with("ply\r\n") || extension == ".ply") {
+  if (head.starts_with("ply\n") || head.starts_with("ply\r\n")) {
     return ReadPly(bytes, text);
   }
-  if (extension == ".obj") {
-    return ReadObj(bytes, text);
+  if (head.starts_with("OFF") || head.starts_with("COFF") || head.starts_with("NOFF")) {
+    return ReadOff(bytes, text);
+  }
+  using Reader = MeshFile (*)(std::string_view, const std::string&);
+  static const std::map<std::string, Reader> kByExtension = {
+      {".stl", ReadStl}, {".msh", ReadGmsh}, {".vtk", ReadVtk}, {".vtu", ReadVtu}, {".vtp", ReadVtu},
+      {".ply", ReadPly}, {".obj", ReadObj},  {".off", ReadOff}};
+  if (const auto reader = kByExtension.find(extension); reader != kByExtension.end()) {
+    return reader->second(bytes, text);
   }
   if (extension == ".node" || extension == ".ele" || extension == ".face") {
     return ParseTetgen(bytes, name, extension, companions);
@@ -86,8 +95,8 @@ MeshFile Choose(std::string_view bytes, const std::filesystem::path& name, const
   if (head.starts_with("solid")) {
     return ReadStl(bytes, text);
   }
-  RefuseMesh(text,
-             "unknown mesh format '" + extension + "'; valid: .msh, .vtk, .vtu, .node, .ele, .face, .stl, .obj, .ply");
+  RefuseMesh(text, "unknown mesh format '" + extension +
+                       "'; valid: .msh, .vtk, .vtu, .vtp, .node, .ele, .face, .stl, .obj, .off, .ply");
 }
 
 }  // namespace

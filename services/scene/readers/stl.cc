@@ -1,4 +1,5 @@
 #include <array>
+#include <cstring>
 #include <map>
 
 #include "services/scene/readers/readers.h"
@@ -77,6 +78,10 @@ MeshFile ReadAscii(Cursor* in) {
       corner_count = 0;
     } else if (word == "facet") {
       in->Line();
+    } else if (word == "end") {
+      in->Expect("solid");  // Some writers separate the words.
+      ended = true;
+      in->Line();
     } else if (word == "endsolid" || word == "solid") {
       ended = word == "endsolid";
       in->Line();
@@ -92,13 +97,20 @@ MeshFile ReadAscii(Cursor* in) {
 
 }  // namespace
 
+bool IsBinaryStl(std::string_view bytes) {
+  if (bytes.size() < kHeaderBytes) return false;
+  std::uint32_t count;
+  std::memcpy(&count, bytes.data() + kHeaderBytes - sizeof(count), sizeof(count));
+  return bytes.size() == kHeaderBytes + static_cast<std::size_t>(count) * kFacetBytes;
+}
+
 MeshFile ReadStl(std::string_view bytes, const std::string& name) {
   Cursor in(bytes, name);
   if (bytes.size() >= kHeaderBytes) {
     in.SetBinary(false);
     in.Skip(kHeaderBytes - sizeof(std::uint32_t), "the header");
     const auto count = in.Take<std::uint32_t>("the number of triangles");
-    if (bytes.size() == kHeaderBytes + static_cast<std::size_t>(count) * kFacetBytes) {
+    if (IsBinaryStl(bytes)) {
       in.CheckCount("triangles", count, 1, kFacetBytes);
       return ReadBinary(&in, count);
     }

@@ -138,8 +138,9 @@ class VtuReader {
   }
 
   void ReadRoot(const Tag& tag) {
-    if (Attribute(tag, "type") != "UnstructuredGrid") {
-      Fail(tag.begin, "type " + Quote(Attribute(tag, "type")) + "; valid: UnstructuredGrid");
+    is_poly_ = Attribute(tag, "type") == "PolyData";
+    if (!is_poly_ && Attribute(tag, "type") != "UnstructuredGrid") {
+      Fail(tag.begin, "type " + Quote(Attribute(tag, "type")) + "; valid: UnstructuredGrid, PolyData");
     }
     const std::string_view order = Attribute(tag, "byte_order");
     if (order != "LittleEndian" && order != "BigEndian" && !order.empty()) {
@@ -167,7 +168,7 @@ class VtuReader {
     if (section == "Points") {
       return &piece.coordinates;
     }
-    if (section != "Cells") {
+    if (section != (is_poly_ ? "Polys" : "Cells")) {
       return nullptr;
     }
     return array == "connectivity" ? &piece.connectivity
@@ -234,6 +235,21 @@ class VtuReader {
     appended_.clear();
   }
 
+  void AddPieceOf(const Tag& tag) {
+    const auto optional = [&](std::string_view key) { return Attribute(tag, key).empty() ? 0 : Number(tag, key); };
+    Piece piece;
+    piece.points = Number(tag, "NumberOfPoints");
+    piece.cells = Number(tag, is_poly_ ? "NumberOfPolys" : "NumberOfCells");
+    piece.begin = tag.begin;
+    if (is_poly_) {
+      if (const auto strips = optional("NumberOfStrips"); strips != 0) {
+        Fail(tag.begin, std::to_string(strips) + " strips of triangles are not read; write triangles or polygons");
+      }
+      mesh_.skipped += optional("NumberOfVerts") + optional("NumberOfLines");
+    }
+    pieces_.push_back(piece);
+  }
+
   void Scan() {
     Tag tag;
     bool has_root = false;
@@ -249,12 +265,9 @@ class VtuReader {
         ReadRoot(tag);
         has_root = true;
       } else if (tag.name == "Piece") {
-        Piece piece;
-        piece.points = Number(tag, "NumberOfPoints");
-        piece.cells = Number(tag, "NumberOfCells");
-        piece.begin = tag.begin;
-        pieces_.push_back(piece);
-      } else if (tag.name == "Points" || tag.name == "Cells" || tag.name == "PointData" || tag.name == "CellData") {
+        AddPieceOf(tag);
+      } else if (tag.name == "Points" || tag.name == "Cells" || tag.name == "Polys" || tag.name == "Lines" ||
+                 tag.name == "Verts" || tag.name == "Strips" || tag.name == "PointData" || tag.name == "CellData") {
         section = tag.is_empty ? std::string_view() : tag.name;
       } else if (tag.name == "DataArray") {
         ReadArray(tag, section);
@@ -266,7 +279,7 @@ class VtuReader {
     }
     if (!has_root || !ended_) {
       Fail(bytes_.size(), std::string("the file ends without ") + (has_root ? "'</VTKFile>'" : "'<VTKFile'") +
-                              ": it was cut short or is no VTU");
+                              ": it was cut short or is no VTU or VTP");
     }
     if (!appended_.empty()) {
       Fail(appended_[0].tag, "the file has no appended data");
@@ -282,7 +295,7 @@ class VtuReader {
                                                               {&piece.offsets, "offsets"},
                                                               {&piece.types, "types"}};
     for (const auto& [array, what] : arrays) {
-      if (!array->present) {
+      if (!array->present && !(is_poly_ && array == &piece.types)) {
         Fail(piece.begin, "the piece has no array " + Quote(what));
       }
     }
@@ -304,8 +317,10 @@ class VtuReader {
       }
     }
     VtkCells cells;
-    cells.types = ReadVtuIntegers(bytes_, name_, encoding_, piece.types, "types", piece.cells);
+    constexpr std::int64_t kPolygon = 7;
+    if (!is_poly_) cells.types = ReadVtuIntegers(bytes_, name_, encoding_, piece.types, "types", piece.cells);
     cells.offsets = ReadVtuIntegers(bytes_, name_, encoding_, piece.offsets, "offsets", piece.cells);
+    if (is_poly_) cells.types.assign(cells.offsets.size(), kPolygon);
     cells.offsets.insert(cells.offsets.begin(), 0);
     const std::int64_t size = cells.offsets.back();
     if (size < 0 || static_cast<std::uint64_t>(size) > kMaxConnectivity - connectivity_) {
@@ -329,6 +344,7 @@ class VtuReader {
   const std::string& name_;
   std::size_t at_ = 0;
   bool ended_ = false;
+  bool is_poly_ = false;  ///< Polygonal data (VTP).
   VtuEncoding encoding_;
   std::deque<Piece> pieces_;                    ///< A deque, because pointers to its arrays must stay valid.
   std::uint64_t cells_ = 0, connectivity_ = 0;  ///< Total of all pieces: several may share the same data.

@@ -72,6 +72,9 @@ std::vector<MeshSample> MeshSamples() {
   add("stl_ascii", "a.stl", Stl(surface, true), false);
   add("stl_binary", "a.stl", Stl(surface, false), false);
   add("obj", "a.obj", Obj(surface), false);
+  add("off", "a.off", Off(surface), false);
+  add("vtp", "a.vtp", Vtp(surface), false);
+  add("vtp_named_vtk", "a.vtk", Vtp(surface), false);
   add("ply_ascii", "a.ply", Ply(surface, Out::kText), false);
   add("ply_binary", "a.ply", Ply(surface, Out::kBinary), false);
   add("ply_binary_swapped", "a.ply", Ply(surface, Out::kSwapped), false);

@@ -77,6 +77,9 @@ std::string TetgenElements(const std::vector<Triangle>& elements, int first, con
 
 std::string Stl(const TriangleMesh& m, bool text);
 std::string Obj(const TriangleMesh& m);
+std::string Off(const TriangleMesh& m);
+/// VTK XML polygonal data, as text.
+std::string Vtp(const TriangleMesh& m);
 std::string Ply(const TriangleMesh& m, Out::Form form);
 
 }  // namespace fulcrum::scene::writers

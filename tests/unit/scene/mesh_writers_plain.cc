@@ -76,6 +76,41 @@ std::string Obj(const TriangleMesh& m) {
   return out.bytes();
 }
 
+std::string Off(const TriangleMesh& m) {
+  Out out(Out::kText);
+  out << "OFF  # a comment\n"
+      << std::to_string(m.vertices.size()) << " " << std::to_string(m.triangles.size()) << " 0\n";
+  for (const Vec3d& p : m.vertices) {
+    out.Point(p) << "0.5 0.5 0.5\n";
+  }
+  for (const Triangle& t : m.triangles) {
+    out.Put(3);
+    for (const Index v : t) out.Put(v);
+    out << "255 0 0\n";
+  }
+  return out.bytes();
+}
+
+std::string Vtp(const TriangleMesh& m) {
+  Out out(Out::kText);
+  out << "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"LittleEndian\">\n<PolyData>\n"
+      << "<Piece NumberOfPoints=\"" << std::to_string(m.vertices.size())
+      << "\" NumberOfVerts=\"0\" NumberOfLines=\"1\" NumberOfStrips=\"0\" NumberOfPolys=\""
+      << std::to_string(m.triangles.size()) << "\">\n"
+      << "<Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">\n";
+  for (const Vec3d& p : m.vertices) out.Point(p).End();
+  out << "</DataArray></Points>\n<Lines><DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">0 1"
+      << "</DataArray></Lines>\n<Polys><DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">\n";
+  for (const Triangle& t : m.triangles) {
+    for (const Index v : t) out.Put(v);
+    out.End();
+  }
+  out << "</DataArray><DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">\n";
+  for (std::size_t i = 1; i <= m.triangles.size(); ++i) out.Put(3 * i).End();
+  out << "</DataArray></Polys>\n</Piece></PolyData></VTKFile>\n";
+  return out.bytes();
+}
+
 std::string Ply(const TriangleMesh& m, Out::Form form) {
   Out out(form);
   out << "ply\nformat "

@@ -1,4 +1,4 @@
-#include "services/records/log_tools/canvas.h"
+#include "services/base/picture/canvas.h"
 
 #include <png.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-namespace fulcrum::log_tools {
+namespace fulcrum::picture {
 namespace {
 
 constexpr int kFirstGlyph = 32, kGlyphs = 95, kGlyphColumns = 5;
@@ -139,4 +139,4 @@ std::string Canvas::Png() const {
   throw std::runtime_error(std::string("cannot make a PNG: ") + image.message);
 }
 
-}  // namespace fulcrum::log_tools
+}  // namespace fulcrum::picture

@@ -7,9 +7,9 @@
 #include <string_view>
 #include <vector>
 
-#include "services/records/log_tools/mask.h"
+#include "services/base/core/types.h"
 
-namespace fulcrum::log_tools {
+namespace fulcrum::picture {
 
 using Rgb = std::array<std::uint8_t, 3>;
 
@@ -54,4 +54,4 @@ class Canvas {
   std::vector<Rgb> pixels_;
 };
 
-}  // namespace fulcrum::log_tools
+}  // namespace fulcrum::picture

@@ -1,0 +1,213 @@
+#include "services/scene/compiler/new_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "services/base/core/error.h"
+#include "services/scene/builder/build.h"
+#include "services/scene/builder/geometry.h"
+#include "services/scene/compiler/import.h"
+#include "services/scene/compiler/mesh_repair.h"
+#include "services/scene/compiler/placement.h"
+#include "services/scene/compiler/scene_yaml.h"
+
+namespace fulcrum::scene {
+namespace {
+
+/// printf into a string.
+template <class... Values>
+std::string Text(const char* format, Values... values) {
+  std::string text(static_cast<std::size_t>(std::snprintf(nullptr, 0, format, values...)) + 1, '\0');
+  std::snprintf(text.data(), text.size(), format, values...);
+  text.pop_back();
+  return text;
+}
+
+/// The unit in which the organ is of a size that organs have.
+std::string LikelyUnit(const MeshFile& file, const std::string& name) {
+  constexpr double kSmall_m = 0.02, kLarge_m = 0.6;
+  const double size = LongestSide(file.vertices);
+  for (const auto& [unit, scale_m] : {std::pair{"mm", 1e-3}, {"m", 1.0}, {"cm", 1e-2}, {"um", 1e-6}}) {
+    if (size * scale_m >= kSmall_m && size * scale_m <= kLarge_m) return unit;
+  }
+  throw InputError(name + ": its longest side is " + Text("%.4g", size) +
+                   ", which is no organ in mm, cm, m or um; give --unit, and `scale` in the description");
+}
+
+/// Means over the rows and columns of a sheet [m].
+struct SheetSize {
+  double width = 0, length = 0;
+};
+
+SheetSize SizeOf(const MembraneSettings& m, const std::vector<Vec3d>& sheet) {
+  SheetSize size;
+  const auto node = [&](int r, int c) { return sheet[static_cast<std::size_t>(r) * m.cols + c]; };
+  for (int r = 0; r < m.rows; ++r) {
+    for (int c = 0; c < m.cols; ++c) {
+      if (c > 0) size.width += (node(r, c) - node(r, c - 1)).norm() / m.rows;
+      if (r > 0) size.length += (node(r, c) - node(r - 1, c)).norm() / m.cols;
+    }
+  }
+  return size;
+}
+
+/// The least multiple of `step` that is not below `value`, plus one.
+int Nodes(double value, int step) { return step * std::max(4, static_cast<int>(std::ceil(value / step))) + 1; }
+
+/// Membrane of about square cells, at most as many as the built-in scene has.
+void ChooseMembrane(const SheetSize& size, MembraneSettings* m) {
+  constexpr double kMostNodes = 16000, kLeastCell_m = 0.0007;
+  constexpr double kGapShare = 0.08, kLeastGap_m = 0.0015, kLargestGap_m = 0.0055, kReach_m = 0.0013;
+  const double cell = std::max(kLeastCell_m, std::sqrt(size.width * size.length / kMostNodes));
+  m->bending_row_stride = 4;
+  m->bending_col_stride = 7;
+  m->rows = Nodes(size.length / cell, m->bending_row_stride);
+  m->cols = Nodes(size.width / cell, m->bending_col_stride);
+  m->gap_m = std::clamp(kGapShare * std::min(size.width, size.length), kLeastGap_m, kLargestGap_m);
+  m->binding_reach_m = m->gap_m + kReach_m;
+}
+
+/// A trocar at this distance and bearing from the membrane's middle, raised until its shaft is clear of everything on
+/// its way to `target`.
+Vec3d Trocar(double x, double y, double z, const Vec3d& target, const Anatomy& anatomy) {
+  constexpr double kClear = 0.006, kStep = 0.005, kHighest = 0.12, kNear = 0.02;
+  for (;; z += kStep) {
+    const Vec3d trocar(x, y, z);
+    const Vec3d along = trocar - target;
+    const auto blocks = [&](const Vec3d& p) {
+      const double f = (p - target).dot(along) / along.squaredNorm();
+      return f * along.norm() > kNear && f < 1 && (target + f * along - p).norm() < kClear;
+    };
+    const bool is_clear = std::none_of(anatomy.organ_vertices.begin(), anatomy.organ_vertices.end(), blocks) &&
+                          std::none_of(anatomy.sheet.begin(), anatomy.sheet.end(), blocks);
+    if (is_clear || z >= kHighest) return trocar;
+  }
+}
+
+std::string TextOf(const Vec3d& p_mm) { return Text("[%.4g, %.4g, %.4g]", p_mm.x(), p_mm.y(), p_mm.z()); }
+
+std::string OrganText(const NewScene& scene, const ImportSettings& import, bool is_patch) {
+  std::string text = "organ:\n  import:\n    organ: \"" + scene.mesh_text + "\"\n    unit: " + scene.unit + "\n";
+  if (import.cap_openings) text += "    cap_openings: true         # or wall_mm: 3, for a hollow organ\n";
+  if (scene.facing) text += "    facing: " + TextOf(*scene.facing) + "\n";
+  if (scene.at_mm) {
+    text += "    patch: {at_mm: " + TextOf(*scene.at_mm) + "}   # further keys: width_mm, length_mm\n";
+  } else if (!is_patch) {
+    text += "    from: 0.1                  # the stretch of the centre line under the membrane\n    to: 0.9\n";
+  } else {
+    text += "    # patch: {at_mm: [x, y, z], width_mm: 60, length_mm: 80}   to move it, in the frame of the file\n";
+  }
+  return text + Text("    cavity_mm: %.0f\n", 1e3 * import.cavity_m);
+}
+
+std::string ScriptText(const SheetSize& size, const Vec3d& hook_wait_mm) {
+  // Distances in millimetres become fractions of the sheet.
+  constexpr double kSpeed = 0.004, kLongestCut = 0.030, kGraspBeside = 0.012, kCutBeside = 0.003;
+  const double lift_mm = 1e3 * std::min(0.020, 0.25 * std::min(size.width, size.length));
+  const double cut = std::min(kLongestCut, 0.4 * size.length);
+  const double from = 0.5 - 0.5 * cut / size.length, to = 0.5 + 0.5 * cut / size.length;
+  const double grasp = std::max(0.2, 0.5 - kGraspBeside / size.width), at = std::min(0.7, 0.5 + kCutBeside / size.width);
+  const double press_mm = 0.15 * lift_mm, start_s = 7.3, end_s = start_s + cut / kSpeed;
+  const std::string fold = Text("sheet: [%.3f, 0.5]", grasp);
+  std::string text = Text("script:                          # places: fractions (across, along) of the membrane and the "
+                          "height above it\n  duration_s: %.1f\n", end_s + 5.2);
+  text += "  tool0:                         # closes on a fold, lifts it, releases it\n";
+  const auto left = [&](double time_s, double height_mm, double jaw_deg) {
+    text += Text("    - {time_s: %.1f, %s, height_mm: %.1f, jaw_deg: %.0f}\n", time_s, fold.c_str(), height_mm, jaw_deg);
+  };
+  left(0, 45, 50);
+  left(1.2, 10, 50);
+  left(2.0, -2.5, 50);
+  left(2.3, -2.5, 50);
+  left(2.9, -2.5, 0);
+  left(3.2, -2, 0);
+  left(5.8, lift_mm, 0);
+  left(end_s + 0.2, lift_mm, 0);
+  left(end_s + 1.6, 3, 0);
+  left(end_s + 2.2, 4, 50);
+  left(end_s + 4.0, 40, 50);
+  text += "  tool1:                         # waits aside, cuts along the organ beside the fold\n";
+  const auto right = [&](double time_s, double t, double height_mm, const char* more) {
+    text += Text("    - {time_s: %.1f, sheet: [%.3f, %.3f], height_mm: %.1f%s}\n", time_s, at, t, height_mm, more);
+  };
+  const std::string aside = Text(", offset_mm: [%.0f, %.0f, %.0f]", hook_wait_mm.x(), hook_wait_mm.y(), hook_wait_mm.z());
+  right(0, from, 25, aside.c_str());
+  right(4.5, from, 25, aside.c_str());
+  right(6.3, from, 10, "");
+  right(7.0, from, press_mm, "");
+  right(start_s, from, press_mm, ", pedal: cut, power_W: 35");
+  right(end_s, to, press_mm, ", pedal: cut, power_W: 35");
+  right(end_s + 0.1, to, press_mm, "");
+  right(end_s + 1.0, to, 14, "");
+  right(end_s + 3.0, to, 25, aside.c_str());
+  return text;
+}
+
+}  // namespace
+
+std::string DescribeNewScene(const NewScene& given, const Progress& progress) {
+  NewScene scene = given;
+  MeshFile file = ReadMesh(scene.mesh);
+  if (scene.unit.empty()) {
+    scene.unit = LikelyUnit(file, scene.mesh.string());
+    if (progress) progress("unit: " + scene.unit);
+  }
+  SceneSettings settings;
+  ImportSettings& import = settings.import.emplace();
+  import.organ_file = scene.mesh;
+  import.scale_m = LengthUnit(scene.unit);
+  if (scene.at_mm) {
+    import.patch = true;
+    import.patch_at_m = (1e-3 * *scene.at_mm).cast<float>();
+  }
+  if (scene.facing) import.facing = scene.facing->cast<float>();
+  settings.membrane.rows = 101;
+  settings.membrane.cols = 64;
+  settings.membrane.gap_m = 0.003;
+  const auto take = [&] {
+    try {
+      return ImportAnatomy(settings, progress);
+    } catch (const OpenSurfaceError& error) {
+      if (progress) progress(std::string(error.what()) + "; they are capped");
+      import.cap_openings = true;
+      return ImportAnatomy(settings, progress);
+    }
+  };
+  const Anatomy anatomy = take();
+  const SheetSize size = SizeOf(settings.membrane, anatomy.sheet);
+  ChooseMembrane(size, &settings.membrane);
+
+  double radius = 0;
+  for (const Vec3d& p : anatomy.organ_vertices) radius = std::max(radius, p.norm());
+  import.cavity_m = std::max(0.085, 1.15 * radius);
+  const double distance_mm = std::clamp(1.2e3 * std::max(size.width, 0.5 * size.length), 60.0, 140.0);
+  const Vec3d grasper = 1e3 * Trocar(-0.085, -0.045, 0.092, Vec3d(-0.01, 0, 0), anatomy);
+  const Vec3d hook = 1e3 * Trocar(0.098, 0, 0.034, Vec3d(0.003, 0, 0), anatomy);
+  const MembraneSettings& m = settings.membrane;
+  std::string text = "# " + Text("Made from %s: a membrane of %.0f x %.0f mm.", scene.mesh.filename().c_str(),
+                                 1e3 * size.width, 1e3 * size.length) +
+                     "\n# The membrane's middle is the origin of the scene, z leads away from the organ, y along it. "
+                     "Every key: services/scene/README.md.\n" +
+                     "name: \"" + scene.name + "\"\n" + "description: \"Organ from " + scene.mesh.filename().string() + "\"\n\n";
+  text += OrganText(scene, import, anatomy.is_patch) + "\n";
+  text += Text("membrane:\n  rows: %d\n  cols: %d\n  gap_mm: %.1f                  # fat between membrane and organ\n"
+               "  binding_reach_mm: %.1f\n\n",
+               m.rows, m.cols, 1e3 * m.gap_m, 1e3 * m.binding_reach_m);
+  text += "tools:\n  tool0: {kind: grasper, trocar_mm: " + TextOf(grasper) + "}\n  tool1: {kind: hook, trocar_mm: " +
+          TextOf(hook) + "}      # low at the side, so that the foot points down\n\n";
+  text += "physics:\n  mode: accurate\n  preset: default\n  damping_per_s: 20\n  gravity_m_s2: [0, 0, 0]        # the rest "
+          "shape already is the shape under gravity\n  membrane_Et_N_per_m: 150\n  membrane_stiffening: 1\n"
+          "  membrane_prestrain: 0.04\n  membrane_bending_uNm: 2\n  fat_youngs_modulus_kPa: 3\n"
+          "  tube_youngs_modulus_kPa: 100   # of the organ\n  tube_poisson: 0.45\n  grasp_radius_mm: 4\n  grip_force_N: 8\n\n";
+  text += "thermal:                         # peritoneum on fat\n  cell_um: 100\n  thickness_mm: 0.3\n"
+          "  conductivity_W_mK: 0.45\n  latent_heat_J_m3: 1.6e9\n  sigma_S_m: 0.35\n  sigma_fat_S_m: 0.035\n"
+          "  fat_depth_mm: 5\n  v_max_V: 350\n  hook_radius_mm: 0.5\n\n";
+  text += "haptics: {force_limit_N: 3.3, slew_N_per_ms: 0.4, force_scale: 0.3}\n\n";
+  text += Text("render:\n  width: 960\n  height: 540\n  rate_Hz: 15\n  png_rate_Hz: 2\n  scope_tip_mm: [%.0f, %.0f, %.0f]\n"
+               "  scope_target_mm: [0, 0, 0]\n  fov_deg: 60\n  scope_angle_deg: 30\n\n",
+               0.05 * distance_mm, -0.71 * distance_mm, 0.7 * distance_mm);
+  return text + ScriptText(size, Vec3d(10, -40, 5));
+}
+
+}  // namespace fulcrum::scene

@@ -1,0 +1,251 @@
+#include "services/scene/compiler/placement.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <queue>
+
+#include "services/scene/builder/geometry.h"
+
+namespace fulcrum::scene {
+namespace {
+
+constexpr int kBands = 24;              ///< Of geodesic distance, along a tube.
+constexpr int kLineSmoothing = 3;       ///< Each moves a point half way to the mean of its neighbours.
+constexpr double kLeastElongation = 2;  ///< Length over mean diameter: a shorter body is no tube.
+/// Share of the body's silhouette, either way, that a patch covers: the corners of a larger one leave a round body.
+constexpr double kPatchShare = 0.65;
+constexpr double kLeastPatch_m = 0.012, kLargestPatch_m = 0.25;
+/// The normal of a patch is the mean over this share of the body's size.
+constexpr double kNormalReach = 0.12;
+
+using Graph = std::vector<std::vector<std::pair<Index, double>>>;
+
+Graph EdgeGraph(const TriangleMesh& mesh) {
+  Graph graph(mesh.vertices.size());
+  for (const Triangle& t : mesh.triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index a = t[k], b = t[(k + 1) % 3];
+      graph[a].emplace_back(b, (mesh.vertices[a] - mesh.vertices[b]).norm());
+    }
+  }
+  return graph;
+}
+
+/// Length of the shortest path along edges from `start`; infinity where there is none.
+std::vector<double> DistancesFrom(const Graph& graph, Index start) {
+  std::vector<double> distance(graph.size(), std::numeric_limits<double>::infinity());
+  using Entry = std::pair<double, Index>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+  distance[start] = 0;
+  queue.emplace(0.0, start);
+  while (!queue.empty()) {
+    const auto [d, v] = queue.top();
+    queue.pop();
+    if (d > distance[v]) continue;
+    for (const auto& [next, length] : graph[v]) {
+      if (d + length < distance[next]) {
+        distance[next] = d + length;
+        queue.emplace(distance[next], next);
+      }
+    }
+  }
+  return distance;
+}
+
+Index FarthestOf(const std::vector<double>& distance) {
+  Index farthest = 0;
+  for (Index v = 0; v < distance.size(); ++v) {
+    if (std::isfinite(distance[v]) && !(distance[v] <= distance[farthest])) farthest = v;
+  }
+  return farthest;
+}
+
+double DistanceToLine(const Vec3d& p, const std::vector<Vec3d>& line) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i + 1 < line.size(); ++i) {
+    const Vec3d along = line[i + 1] - line[i];
+    const double f = std::clamp((p - line[i]).dot(along) / along.squaredNorm(), 0.0, 1.0);
+    least = std::min(least, (line[i] + f * along - p).norm());
+  }
+  return least;
+}
+
+double LengthOf(const std::vector<Vec3d>& line) {
+  double length = 0;
+  for (std::size_t i = 0; i + 1 < line.size(); ++i) {
+    length += (line[i + 1] - line[i]).norm();
+  }
+  return length;
+}
+
+/// Turned so that its largest component is positive: the same direction whatever the order of the file.
+Vec3d WithPositiveSense(const Vec3d& direction) {
+  Eigen::Index largest;
+  direction.cwiseAbs().maxCoeff(&largest);
+  return direction[largest] < 0 ? Vec3d(-direction) : direction;
+}
+
+struct AreaMoments {
+  double area = 0;
+  Vec3d centroid = Vec3d::Zero();
+  Mat3d covariance = Mat3d::Zero();
+};
+
+AreaMoments MomentsOf(const TriangleMesh& surface) {
+  AreaMoments moments;
+  const auto each = [&](const auto& take) {
+    for (const Triangle& t : surface.triangles) {
+      const Vec3d &a = surface.vertices[t[0]], &b = surface.vertices[t[1]], &c = surface.vertices[t[2]];
+      take((b - a).cross(c - a).norm() / 2, Vec3d((a + b + c) / 3));
+    }
+  };
+  each([&](double area, const Vec3d& p) {
+    moments.area += area;
+    moments.centroid += area * p;
+  });
+  moments.centroid /= moments.area;
+  each([&](double area, const Vec3d& p) {
+    moments.covariance += area / moments.area * (p - moments.centroid) * (p - moments.centroid).transpose();
+  });
+  return moments;
+}
+
+/// Outward normal around the point of the surface nearest to `p`.
+Vec3d NormalAround(const TriangleMesh& surface, const Vec3d& p, Vec3d* nearest) {
+  const double size = LongestSide(surface.vertices);
+  const TriangleLocator locator(surface.vertices, surface.triangles);
+  const auto hit = locator.Closest(p, 10 * size + (p - surface.vertices[0]).norm());
+  *nearest = hit.triangle == kNoIndex ? surface.vertices[0] : hit.closest.point;
+  const Triangle& at = surface.triangles[hit.triangle == kNoIndex ? 0 : hit.triangle];
+  const auto normal = [&](const Triangle& t) -> Vec3d {
+    const Vec3d& a = surface.vertices[t[0]];
+    return (surface.vertices[t[1]] - a).cross(surface.vertices[t[2]] - a);
+  };
+  const Vec3d own = normal(at).normalized();
+  Vec3d sum = Vec3d::Zero();
+  for (const Triangle& t : surface.triangles) {
+    // A wall's other side faces away from this one.
+    if ((surface.vertices[t[0]] - *nearest).norm() < kNormalReach * size && normal(t).dot(own) > 0) sum += normal(t);
+  }
+  return sum.norm() > 0 ? Vec3d(sum.normalized()) : own;
+}
+
+/// Rows are the axes x, y, z of W, with z along `up` and y as near to `along` as possible.
+Mat3d FrameOf(const Vec3d& up, const Vec3d& along) {
+  const Vec3d z = up.normalized();
+  Vec3d y = along - along.dot(z) * z;
+  if (!(y.norm() > 1e-6 * along.norm())) y = z.unitOrthogonal();
+  y.normalize();
+  Mat3d R_WF;
+  R_WF.row(0) = y.cross(z).transpose();
+  R_WF.row(1) = y.transpose();
+  R_WF.row(2) = z.transpose();
+  return R_WF;
+}
+
+}  // namespace
+
+double LongestSide(const std::vector<Vec3d>& points) {
+  Vec3d low = Vec3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (const Vec3d& p : points) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  return points.empty() ? 0 : (high - low).maxCoeff();
+}
+
+std::vector<Vec3d> FindCentreLine(const TriangleMesh& surface) {
+  const Graph graph = EdgeGraph(surface);
+  // Twice the farthest: the first start may lie anywhere.
+  const Index end = FarthestOf(DistancesFrom(graph, surface.triangles[0][0]));
+  const std::vector<double> distance = DistancesFrom(graph, end);
+  const double longest = distance[FarthestOf(distance)];
+  std::vector<Vec3d> sum(kBands, Vec3d::Zero());
+  std::vector<double> weight(kBands, 0);
+  for (const Triangle& t : surface.triangles) {
+    const Vec3d &a = surface.vertices[t[0]], &b = surface.vertices[t[1]], &c = surface.vertices[t[2]];
+    const double mean = (distance[t[0]] + distance[t[1]] + distance[t[2]]) / 3;
+    if (!std::isfinite(mean)) continue;
+    const auto band = static_cast<std::size_t>(std::min(kBands - 1.0, mean / longest * kBands));
+    const double area = (b - a).cross(c - a).norm() / 2;
+    sum[band] += area * (a + b + c) / 3;
+    weight[band] += area;
+  }
+  std::vector<Vec3d> line;
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    if (weight[i] > 0) line.push_back(sum[i] / weight[i]);
+  }
+  if (line.size() < 3) return {};
+  for (int k = 0; k < kLineSmoothing; ++k) {
+    const std::vector<Vec3d> old = line;
+    for (std::size_t i = 1; i + 1 < line.size(); ++i) {
+      line[i] = 0.5 * old[i] + 0.25 * (old[i - 1] + old[i + 1]);
+    }
+  }
+  double radius = 0, area = 0;
+  for (const Triangle& t : surface.triangles) {
+    const Vec3d &a = surface.vertices[t[0]], &b = surface.vertices[t[1]], &c = surface.vertices[t[2]];
+    const double share = (b - a).cross(c - a).norm() / 2;
+    radius += share * DistanceToLine((a + b + c) / 3, line);
+    area += share;
+  }
+  radius /= area;
+  if (!(LengthOf(line) > kLeastElongation * 2 * radius)) return {};
+  if (WithPositiveSense(line.back() - line.front()).dot(line.back() - line.front()) < 0) {
+    std::reverse(line.begin(), line.end());
+  }
+  return line;
+}
+
+std::vector<Placement> PlacesOfTube(const std::vector<Vec3d>& line, const ImportSettings& import) {
+  const Vec3d chord = (line.back() - line.front()).normalized();
+  Vec3d up = import.facing ? Vec3d(import.facing->cast<double>()) : Vec3d::UnitZ();
+  // Along the tube no direction leads out of it.
+  if (!(up.normalized().cross(chord).norm() > 0.5)) up = std::abs(chord.y()) < 0.8 ? Vec3d::UnitY() : Vec3d::UnitX();
+  up = (up - up.dot(chord) * chord).normalized();
+  const Vec3d side = chord.cross(up);
+  std::vector<Placement> places;
+  for (const Vec3d& direction : {up, side, Vec3d(-side), Vec3d(-up)}) {
+    Placement placement;
+    placement.R_WF = FrameOf(direction, chord);
+    placement.origin_m = line[line.size() / 2];
+    for (const Vec3d& p : line) {
+      placement.centre_line.push_back(placement.ToWorld(p));
+    }
+    places.push_back(std::move(placement));
+    if (import.facing) break;
+  }
+  return places;
+}
+
+Placement PlacePatch(const TriangleMesh& surface, const ImportSettings& import) {
+  const AreaMoments moments = MomentsOf(surface);
+  const Eigen::SelfAdjointEigenSolver<Mat3d> axes(moments.covariance);  // Ascending.
+  Placement placement;
+  Vec3d up = WithPositiveSense(axes.eigenvectors().col(0));
+  placement.origin_m = moments.centroid;
+  if (import.patch_at_m) {
+    up = NormalAround(surface, import.patch_at_m->cast<double>(), &placement.origin_m);
+  }
+  if (import.facing) up = import.facing->cast<double>();
+  placement.R_WF = FrameOf(up, WithPositiveSense(axes.eigenvectors().col(2)));
+  Vec3d low = Vec3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (const Vec3d& p : surface.vertices) {
+    low = low.cwiseMin(placement.ToWorld(p));
+    high = high.cwiseMax(placement.ToWorld(p));
+  }
+  if (!import.patch_at_m) {
+    const Vec3d middle(0.5 * (low.x() + high.x()), 0.5 * (low.y() + high.y()), 0);
+    placement.origin_m += placement.R_WF.transpose() * middle;
+  }
+  const auto size = [](double wanted, double extent) {
+    return wanted > 0 ? wanted : std::clamp(kPatchShare * extent, kLeastPatch_m, kLargestPatch_m);
+  };
+  placement.patch_width_m = size(import.patch_width_m, high.x() - low.x());
+  placement.patch_length_m = size(import.patch_length_m, high.y() - low.y());
+  return placement;
+}
+
+}  // namespace fulcrum::scene
