@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render_node/geometry/sheet_rim.h"
+
 namespace fulcrum::render {
 namespace {
 
@@ -11,6 +13,7 @@ namespace {
 constexpr float kMostDepth = 0.0025f;   // [m]
 constexpr float kLeastDepth = 0.0006f;  // [m]
 constexpr float kThickFat = 0.004f;     // [m]
+constexpr float kThinsToRim = 2.5f;     // Thickness by which fat recedes from a rim that is fused with the organ.
 // Share of the membrane's lift beyond rest that the loose fat follows; the rest is opened areolar tissue.
 constexpr float kFollow = 0.45f;
 
@@ -55,8 +58,10 @@ FatLayer::FatLayer(const SceneView& scene, std::uint32_t stride) {
     gaps.push_back(anchor.rest_gap);
   }
   std::nth_element(gaps.begin(), gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 10), gaps.end());
+  const std::vector<float> rim = SheetRim(scene);
   for (const Anchor& anchor : anchors_) {
-    thickness_.push_back(std::clamp((anchor.rest_gap - gaps[gaps.size() / 10]) / kThickFat, 0.0f, 1.0f));
+    thickness_.push_back(std::clamp((anchor.rest_gap - gaps[gaps.size() / 10]) / kThickFat, 0.0f, 1.0f) +
+                         kThinsToRim * std::min(0.0f, rim[anchor.node]));
   }
   const auto width = static_cast<Index>(cols.size());
   for (Index r = 0; r + 1 < rows.size(); ++r) {

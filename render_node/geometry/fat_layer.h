@@ -23,7 +23,8 @@ class FatLayer {
   [[nodiscard]] std::span<const Vec3f> positions() const { return positions_; }
   [[nodiscard]] std::span<const Vec3f> normals() const { return normals_; }
   [[nodiscard]] std::span<const Vec2f> materials() const { return materials_; }  ///< (s, t) [m].
-  /// Thickness at rest: 0 where membrane and tube are closest, 1 where their gap is 4 mm larger.
+  /// Thickness at rest: 0 where membrane and tube are closest, 1 where their gap is 4 mm larger, negative towards a rim
+  /// that is fused with the organ, where there is none.
   [[nodiscard]] std::span<const float> thickness() const { return thickness_; }
   [[nodiscard]] std::span<const Triangle> triangles() const { return triangles_; }
   /// Bared share of each vertex: 1 where `opened` is true for (s, t) [m] or the membrane above is removed, 0.5 beside

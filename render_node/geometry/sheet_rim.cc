@@ -12,54 +12,80 @@ constexpr float kRim_m = 0.021f;
 constexpr float kNear_m = 0.003f;
 constexpr std::uint32_t kSamplesOfASide = 16;
 
+/// Sides of the grid.
+struct Sides {
+  bool before_rows = false, after_rows = false, before_cols = false, after_cols = false;
+  [[nodiscard]] bool any() const { return before_rows || after_rows || before_cols || after_cols; }
+};
+
+class Sheet {
+ public:
+  explicit Sheet(const SceneView& scene)
+      : scene_(scene), last_row_(scene.membrane.rows - 1), last_col_(scene.membrane.cols - 1) {}
+
+  /// The sides most of which are near these triangles.
+  [[nodiscard]] Sides Near(std::span<const Vec3f> vertices, std::span<const Triangle> triangles) const {
+    if (triangles.empty()) return {};
+    const NearestOnSurface nearest(vertices, triangles);
+    const std::span<const float> xyz(vertices.front().data(), 3 * vertices.size());
+    const auto is_near = [&](std::uint32_t row_step, std::uint32_t row, std::uint32_t col_step, std::uint32_t col) {
+      std::uint32_t near = 0;
+      for (std::uint32_t k = 0; k < kSamplesOfASide; ++k) {
+        const Vec3f p = Place(row + k * row_step / (kSamplesOfASide - 1), col + k * col_step / (kSamplesOfASide - 1));
+        near += (nearest.Find(p).At(xyz) - p).norm() < kNear_m ? 1 : 0;
+      }
+      return 2 * near > kSamplesOfASide;
+    };
+    return {is_near(0, 0, last_col_, 0), is_near(0, last_row_, last_col_, 0), is_near(last_row_, 0, 0, 0),
+            is_near(last_row_, 0, 0, last_col_)};
+  }
+
+  /// 1 on these sides, falling to 0.
+  [[nodiscard]] std::vector<float> From(const Sides& sides) const {
+    std::vector<float> rim(scene_.membrane.node_count(), 0.0f);
+    // Steps of the grid in its middle.
+    const std::uint32_t r = last_row_ / 2, c = last_col_ / 2;
+    const float along = (Place(r + 1, c) - Place(r, c)).norm(), across = (Place(r, c + 1) - Place(r, c)).norm();
+    const float width =
+        std::min({kRim_m, along * static_cast<float>(last_row_) / 3, across * static_cast<float>(last_col_) / 3});
+    if (!(width > 0)) return rim;
+    for (std::uint32_t row = 0; row <= last_row_; ++row) {
+      for (std::uint32_t col = 0; col <= last_col_; ++col) {
+        float inside = width;
+        if (sides.before_rows) inside = std::min(inside, along * static_cast<float>(row));
+        if (sides.after_rows) inside = std::min(inside, along * static_cast<float>(last_row_ - row));
+        if (sides.before_cols) inside = std::min(inside, across * static_cast<float>(col));
+        if (sides.after_cols) inside = std::min(inside, across * static_cast<float>(last_col_ - col));
+        rim[row * scene_.membrane.cols + col] = 1 - inside / width;
+      }
+    }
+    return rim;
+  }
+
+ private:
+  [[nodiscard]] const Vec3f& Place(std::uint32_t row, std::uint32_t col) const {
+    return scene_.rest_position[scene_.membrane.first + row * scene_.membrane.cols + col];
+  }
+
+  const SceneView& scene_;
+  std::uint32_t last_row_, last_col_;
+};
+
 }  // namespace
 
 std::vector<float> SheetRim(const SceneView& scene) {
   const MembraneGrid& grid = scene.membrane;
-  std::vector<float> rim(grid.node_count(), 0.0f);
+  if (grid.rows < 2 || grid.cols < 2) return std::vector<float>(grid.node_count(), 0.0f);
   std::vector<Triangle> around;
   for (const StaticSurface& surface : scene.static_surfaces) {
     if (surface.role != SurfaceRole::kRetroperitoneum) continue;
     const auto triangles = scene.static_triangles.subspan(surface.first_triangle, surface.triangle_count);
     around.insert(around.end(), triangles.begin(), triangles.end());
   }
-  if (around.empty() || grid.rows < 2 || grid.cols < 2) return rim;
-
-  const auto place = [&](std::uint32_t row, std::uint32_t col) {
-    return scene.rest_position[grid.first + row * grid.cols + col];
-  };
-  const NearestOnSurface nearest(scene.static_vertices, around);
-  const std::span<const float> vertices(scene.static_vertices.front().data(), 3 * scene.static_vertices.size());
-  const std::uint32_t last_row = grid.rows - 1, last_col = grid.cols - 1;
-  const auto goes_on = [&](const auto& place_at, std::uint32_t last) {
-    std::uint32_t near = 0;
-    for (std::uint32_t k = 0; k < kSamplesOfASide; ++k) {
-      const Vec3f p = place_at(k * last / (kSamplesOfASide - 1));
-      near += (nearest.Find(p).At(vertices) - p).norm() < kNear_m ? 1 : 0;
-    }
-    return 2 * near > kSamplesOfASide;
-  };
-  const bool before_rows = goes_on([&](std::uint32_t at) { return place(0, at); }, last_col);
-  const bool after_rows = goes_on([&](std::uint32_t at) { return place(last_row, at); }, last_col);
-  const bool before_cols = goes_on([&](std::uint32_t at) { return place(at, 0); }, last_row);
-  const bool after_cols = goes_on([&](std::uint32_t at) { return place(at, last_col); }, last_row);
-
-  // Steps of the grid in its middle.
-  const std::uint32_t r = last_row / 2, c = last_col / 2;
-  const float along = (place(r + 1, c) - place(r, c)).norm(), across = (place(r, c + 1) - place(r, c)).norm();
-  const float width =
-      std::min({kRim_m, along * static_cast<float>(last_row) / 3, across * static_cast<float>(last_col) / 3});
-  if (!(width > 0)) return rim;
-  for (std::uint32_t row = 0; row < grid.rows; ++row) {
-    for (std::uint32_t col = 0; col < grid.cols; ++col) {
-      float inside = width;
-      if (before_rows) inside = std::min(inside, along * static_cast<float>(row));
-      if (after_rows) inside = std::min(inside, along * static_cast<float>(last_row - row));
-      if (before_cols) inside = std::min(inside, across * static_cast<float>(col));
-      if (after_cols) inside = std::min(inside, across * static_cast<float>(last_col - col));
-      rim[row * grid.cols + col] = 1 - inside / width;
-    }
-  }
+  const Sheet sheet(scene);
+  if (const Sides sides = sheet.Near(scene.static_vertices, around); sides.any()) return sheet.From(sides);
+  std::vector<float> rim = sheet.From(sheet.Near(scene.rest_position, scene.tube_surface));
+  for (float& value : rim) value = -value;
   return rim;
 }
 

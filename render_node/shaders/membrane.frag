@@ -3,7 +3,7 @@
 // more than on the present temperature, so burns persist. One triangle draws both layers: the fascia is sampled where
 // the line of sight meets it, and the two are blended here, the nearer one on top. So their order is correct for each
 // pixel, for either side of the sheet and any order of triangles. coordinate: material (s, t) [m], side (see
-// geometry/membrane_mesh.h), nearness of a rim that fixed tissue continues.
+// geometry/membrane_mesh.h), nearness of a rim that fixed tissue continues or, negative, that is fused with the organ.
 in vec3 position;
 in vec3 normal;
 in vec4 coordinate;
@@ -101,7 +101,7 @@ void main() {
   albedo = mix(albedo, vec3(0.22, 0.075, 0.022), hot);
   alpha = mix(alpha, 0.95, hot);
   // Blood lies on top and seeps away where the sheet ends.
-  float blood = heat.a < 0.97 ? BloodAt(m * atlas_per_metre) * (1.0 - smoothstep(0.5, 0.95, coordinate.w)) : 0.0;
+  float blood = heat.a < 0.97 ? BloodAt(m * atlas_per_metre) * (1.0 - smoothstep(0.5, 0.95, abs(coordinate.w))) : 0.0;
   float bloody = smoothstep(0.15, 0.45, blood);
   albedo = mix(albedo, BloodColour(blood), bloody);
   alpha = mix(alpha, 0.97, bloody);
@@ -139,5 +139,7 @@ void main() {
   // Highlights are opaque.
   float gloss;
   vec3 shaded = ShadeTissue(tissue_tint * albedo, vec3(0.30, 0.16, 0.10), n, film, position, wet, gloss);
-  fragment = vec4(ToneMap(shaded), min(both + 0.8 * gloss, 1.0) * (1.0 - smoothstep(0.93, 1.0, coordinate.w)));
+  // The sheet ends where its tissue does, or fades into the organ.
+  float end = coordinate.w < 0.0 ? smoothstep(0.25, 0.85, -coordinate.w + 0.5 * bend.y) : smoothstep(0.93, 1.0, coordinate.w);
+  fragment = vec4(ToneMap(shaded), min(both + 0.8 * gloss, 1.0) * (1.0 - end));
 }
