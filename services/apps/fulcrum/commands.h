@@ -32,6 +32,7 @@ ExitCode Doctor(const Words& words);
 ExitCode Inputs(const Words& words);
 ExitCode Console(const Words& words);
 ExitCode Reference(const Words& words);
+ExitCode Scene(const Words& words);
 ExitCode Assess(const Words& words);
 ExitCode Trainee(const Words& words);
 ExitCode Questionnaire(const Words& words);

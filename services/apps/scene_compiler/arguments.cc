@@ -10,6 +10,7 @@ namespace {
 constexpr const char* kUsage =
     R"(usage: scene_compiler SCENE.yaml --out FILE [options]
        scene_compiler --new NAME --from MESH [--unit U] [--at X,Y,Z] [--facing X,Y,Z] [--out FILE.yaml]
+       scene_compiler --anatomy LABELS.nii.gz [--map LABELS.yaml --out DIR]
        scene_compiler --info FILE [--preview FILE.png]
        scene_compiler --source FILE
        scene_compiler --list [DIR]
@@ -28,6 +29,7 @@ Options:
   --set SECTION.KEY=VALUE  replace a parameter of physics, thermal, haptics, breathing or render in the description,
                            script.power_W (the power of all uses of the generator), or script.hand (expert, novice) and
                            script.seed: performs the script; may be repeated
+  --check                  build the scene without writing it
   --preview FILE.png       draw the compiled scene from four sides
   --limit SECONDS          give up after this time (default: 120)
   --new NAME               write NAME.yaml (or --out) and the picture NAME.png beside it
@@ -35,6 +37,9 @@ Options:
   --unit U                 of the mesh: m, cm, mm, um (default: the one in which it has the size of an organ)
   --at X,Y,Z               the middle of the membrane, in mm in the frame of the mesh (default: found)
   --facing X,Y,Z           direction from the organ to the membrane, in the frame of the mesh (default: found)
+  --anatomy FILE           a segmentation (NIfTI label map): writes a mesh per label, a scene and a report into --out;
+                           without --map, prints a map to be edited
+  --map FILE               what becomes of each label
   --quiet                  print no progress and no report
   --info FILE              print the content and quality of a compiled scene
   --source FILE            print the effective YAML of a compiled scene
@@ -88,6 +93,10 @@ Arguments ParseArguments(const std::vector<std::string>& words) {
       arguments.new_name = value();
     } else if (word == "--from") {
       arguments.from = value();
+    } else if (word == "--anatomy") {
+      arguments.anatomy = value();
+    } else if (word == "--map") {
+      arguments.map = value();
     } else if (word == "--unit") {
       arguments.unit = value();
     } else if (word == "--at") {
@@ -96,6 +105,8 @@ Arguments ParseArguments(const std::vector<std::string>& words) {
       arguments.facing = value();
     } else if (word == "--list") {
       arguments.list = true;
+    } else if (word == "--check") {
+      arguments.check = true;
     } else if (word == "--quiet") {
       arguments.quiet = true;
     } else if (word.starts_with("-")) {

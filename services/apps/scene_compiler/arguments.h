@@ -11,8 +11,9 @@ struct Arguments {
   std::vector<std::string> changes;  ///< Values of --set, each "section.key=value".
   std::string out, data, info, source, preview;
   std::string new_name, from, unit, at_mm, facing;  ///< A new scene: its name, its mesh, and what the user says of it.
+  std::string anatomy, map;                         ///< A segmentation, and what becomes of its labels.
   double limit_s = 120;
-  bool list = false, quiet = false, help = false;
+  bool list = false, check = false, quiet = false, help = false;
 };
 
 /// Parses the command line. Throws InputError on an unknown option or a missing value.

@@ -18,6 +18,7 @@
 #include "services/base/core/error.h"
 #include "services/base/core/exit_code.h"
 #include "services/base/runtime/install_places.h"
+#include "services/scene/anatomy/import_anatomy.h"
 #include "services/scene/builder/quality.h"
 #include "services/scene/compiler/compile.h"
 #include "services/scene/compiler/new_scene.h"
@@ -127,17 +128,23 @@ void Preview(const SceneView& view, const std::string& file) {
 }
 
 void Compile(const Arguments& arguments) {
-  if (arguments.plain.size() != 1 || (arguments.out.empty() && arguments.preview.empty())) {
+  if (arguments.plain.size() != 1 || (arguments.out.empty() && arguments.preview.empty() && !arguments.check)) {
     throw InputError("SCENE.yaml or --out FILE is missing, or there is more than one SCENE.yaml; see --help");
   }
   const Stages stages(arguments.quiet);
   const Limit limit(arguments.limit_s);
-  const fs::path fault = fs::path(arguments.out.empty() ? arguments.preview : arguments.out).replace_extension(".fault.png");
+  fs::path fault = !arguments.out.empty()     ? fs::path(arguments.out)
+                   : !arguments.preview.empty() ? fs::path(arguments.preview)
+                                                : fs::path(arguments.plain[0]).filename();
+  fault.replace_extension(".fault.png");
   ShowingFaults(fault, [&] {
     const scene::CompiledScene compiled =
         scene::CompileScene(arguments.plain[0], arguments.data, stages.progress(), arguments.changes);
     Preview(compiled.data.View(), arguments.preview);
-    if (arguments.out.empty()) return;
+    if (arguments.out.empty()) {
+      if (!arguments.quiet) std::cout << scene::Describe(compiled.data.View(), scene::Measure(compiled.data.View()));
+      return;
+    }
     stages.Say("writing " + arguments.out);
     scene::WriteSceneFile(compiled.data, compiled.effective_yaml, arguments.out);
     const scene::SceneFile written(arguments.out);  // Reads the file back with all checks that a node makes.
@@ -164,12 +171,13 @@ void MakeNew(const Arguments& arguments) {
   const Stages stages(arguments.quiet);
   const Limit limit(arguments.limit_s);
   const fs::path folder = yaml.has_parent_path() ? yaml.parent_path() : ".";
-  const scene::NewScene wanted{name,
-                               arguments.from,
-                               fs::proximate(arguments.from, folder).string(),
-                               arguments.unit,
-                               PointOf("--at", arguments.at_mm),
-                               PointOf("--facing", arguments.facing)};
+  scene::NewScene wanted;
+  wanted.name = name;
+  wanted.mesh = arguments.from;
+  wanted.mesh_text = fs::proximate(arguments.from, folder).string();
+  wanted.unit = arguments.unit;
+  wanted.at_mm = PointOf("--at", arguments.at_mm);
+  wanted.facing = PointOf("--facing", arguments.facing);
   ShowingFaults(fs::path(yaml).replace_extension(".fault.png"), [&] {
     WriteFile(yaml, scene::DescribeNewScene(wanted, stages.progress()));
     stages.Say("wrote " + yaml.string());
@@ -185,6 +193,28 @@ void MakeNew(const Arguments& arguments) {
   });
 }
 
+void ImportLabels(const Arguments& arguments) {
+  const Stages stages(arguments.quiet);
+  const Limit limit(arguments.limit_s);
+  if (arguments.map.empty()) {
+    const std::string suggestion = scene::SuggestLabelUses(scene::ReadLabelMap(arguments.anatomy));
+    if (suggestion.empty()) throw InputError(arguments.anatomy + ": every voxel is 0: nothing is labelled");
+    std::cout << suggestion;
+    std::fprintf(stderr, "edit these lines, save them as labels.yaml and give --map labels.yaml --out DIR\n");
+    return;
+  }
+  if (arguments.out.empty()) throw InputError("--anatomy needs --out DIR; see --help");
+  const fs::path out = arguments.out;
+  const std::string name = (out.has_filename() ? out : out.parent_path()).filename().string();
+  ShowingFaults("organ.fault.png", [&] {
+    (void)scene::ImportAnatomyFiles({name, arguments.anatomy, arguments.map, out}, stages.progress());
+  });
+  if (!arguments.quiet) {
+    std::cout << "\nNext: look at " << (out / "report.html").string() << ", then\n  fulcrum up "
+              << (out / (name + ".yaml")).string() << "\n";
+  }
+}
+
 }  // namespace
 
 void Run(const Arguments& arguments) {
@@ -194,6 +224,8 @@ void Run(const Arguments& arguments) {
     const scene::SceneFile file(arguments.info);
     std::cout << "scene '" << file.view().name << "'\n" << scene::Describe(file.view(), scene::Measure(file.view()));
     Preview(file.view(), arguments.preview);
+  } else if (!arguments.anatomy.empty()) {
+    ImportLabels(arguments);
   } else if (!arguments.new_name.empty()) {
     MakeNew(arguments);
   } else if (!arguments.source.empty()) {

@@ -30,6 +30,15 @@ double SiFactor(std::string_view key) {
 
 bool StrictMap::Has(std::string_view key) const { return node_->Find(key) != nullptr; }
 
+void StrictMap::KeepNearer(std::string_view one, std::string_view other) {
+  const Node *a = node_->Find(one), *b = node_->Find(other);
+  if (a == nullptr || b == nullptr) return;
+  const int a_file = a->line / internal::kLinesPerFile, b_file = b->line / internal::kLinesPerFile;
+  if (a_file == b_file) return;
+  const std::string_view farther = a_file > b_file ? one : other;
+  std::erase_if(node_->entries, [&](const auto& entry) { return entry.first == farther; });
+}
+
 std::vector<std::string> StrictMap::Keys() const {
   std::vector<std::string> keys;
   for (const auto& entry : node_->entries) {

@@ -115,6 +115,10 @@ class StrictMap {
   /// use: each key must still be read.
   [[nodiscard]] std::vector<std::string> Keys() const;
 
+  /// Of two keys that exclude each other, omits the one that comes from the farther base, so that a file can replace
+  /// what its base chose. Without effect if both are in one file.
+  void KeepNearer(std::string_view one, std::string_view other);
+
   /// For rules that span several keys: throws InputError at this key's line: "file:line: path: `reason`".
   [[noreturn]] void Fail(std::string_view key, std::string_view reason) const;
 

@@ -98,7 +98,8 @@ std::string OrganText(const NewScene& scene, const ImportSettings& import, bool 
   } else {
     text += "    # patch: {at_mm: [x, y, z], width_mm: 60, length_mm: 80}   to move it, in the frame of the file\n";
   }
-  return text + Text("    cavity_mm: %.0f\n", 1e3 * import.cavity_m);
+  text += Text("    cavity_mm: %.0f\n", 1e3 * import.cavity_m);
+  return scene.surroundings.empty() ? text : text + "    surroundings:\n" + scene.surroundings;
 }
 
 std::string ScriptText(const SheetSize& size, const Vec3d& hook_wait_mm) {

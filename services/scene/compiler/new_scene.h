@@ -17,6 +17,7 @@ struct NewScene {
   std::string unit;                  ///< Empty: the one in which the organ has a likely size.
   std::optional<Vec3d> at_mm;        ///< Middle of the membrane, in the frame of the file.
   std::optional<Vec3d> facing;       ///< From the organ to the membrane, in the frame of the file.
+  std::string surroundings;          ///< Lines of the list `surroundings`, indented by six; may be empty.
 };
 
 /// The text of the description. Imports the mesh on the way, which decides what it says. Throws InputError.

@@ -12,6 +12,7 @@ namespace fulcrum::scene {
 namespace {
 
 constexpr int kBands = 24;              ///< Of geodesic distance, along a tube.
+constexpr int kRounds = 3;              ///< In which the bands are made anew along the line.
 constexpr int kLineSmoothing = 3;       ///< Each moves a point half way to the mean of its neighbours.
 constexpr double kLeastElongation = 2;  ///< Length over mean diameter: a shorter body is no tube.
 /// Share of the body's silhouette, either way, that a patch covers: the corners of a larger one leave a round body.
@@ -62,14 +63,23 @@ Index FarthestOf(const std::vector<double>& distance) {
   return farthest;
 }
 
-double DistanceToLine(const Vec3d& p, const std::vector<Vec3d>& line) {
-  double least = std::numeric_limits<double>::infinity();
+struct Foot {
+  double distance;  ///< From the line.
+  double along;     ///< Length of the line up to the nearest point.
+};
+
+Foot FootOn(const Vec3d& p, const std::vector<Vec3d>& line) {
+  Foot foot{std::numeric_limits<double>::infinity(), 0};
+  double passed = 0;
   for (std::size_t i = 0; i + 1 < line.size(); ++i) {
     const Vec3d along = line[i + 1] - line[i];
-    const double f = std::clamp((p - line[i]).dot(along) / along.squaredNorm(), 0.0, 1.0);
-    least = std::min(least, (line[i] + f * along - p).norm());
+    const double length = along.norm();
+    const double f = std::clamp((p - line[i]).dot(along) / (length * length), 0.0, 1.0);
+    const double distance = (line[i] + f * along - p).norm();
+    if (distance < foot.distance) foot = {distance, passed + f * length};
+    passed += length;
   }
-  return least;
+  return foot;
 }
 
 double LengthOf(const std::vector<Vec3d>& line) {
@@ -78,6 +88,46 @@ double LengthOf(const std::vector<Vec3d>& line) {
     length += (line[i + 1] - line[i]).norm();
   }
   return length;
+}
+
+/// Centroids of the surface's bands, smoothed. @param place 0 … 1 along the body for a triangle and its middle.
+template <class Place>
+std::vector<Vec3d> MiddlesOfBands(const TriangleMesh& surface, const Place& place) {
+  std::vector<Vec3d> sum(kBands, Vec3d::Zero());
+  std::vector<double> weight(kBands, 0);
+  for (const Triangle& t : surface.triangles) {
+    const Vec3d &a = surface.vertices[t[0]], &b = surface.vertices[t[1]], &c = surface.vertices[t[2]];
+    const Vec3d middle = (a + b + c) / 3;
+    const double at = place(t, middle);
+    if (!std::isfinite(at)) continue;
+    const auto band = static_cast<std::size_t>(std::clamp(at * kBands, 0.0, kBands - 1.0));
+    const double area = (b - a).cross(c - a).norm() / 2;
+    sum[band] += area * middle;
+    weight[band] += area;
+  }
+  std::vector<Vec3d> line;
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    if (weight[i] > 0) line.push_back(sum[i] / weight[i]);
+  }
+  for (int k = 0; k < kLineSmoothing; ++k) {
+    const std::vector<Vec3d> old = line;
+    for (std::size_t i = 1; i + 1 < line.size(); ++i) {
+      line[i] = 0.5 * old[i] + 0.25 * (old[i - 1] + old[i + 1]);
+    }
+  }
+  return line;
+}
+
+/// Whether a line is that of a tube around it.
+bool IsLong(const TriangleMesh& surface, const std::vector<Vec3d>& line) {
+  double radius = 0, area = 0;
+  for (const Triangle& t : surface.triangles) {
+    const Vec3d &a = surface.vertices[t[0]], &b = surface.vertices[t[1]], &c = surface.vertices[t[2]];
+    const double share = (b - a).cross(c - a).norm() / 2;
+    radius += share * FootOn((a + b + c) / 3, line).distance;
+    area += share;
+  }
+  return LengthOf(line) > kLeastElongation * 2 * radius / area;
 }
 
 /// Turned so that its largest component is positive: the same direction whatever the order of the file.
@@ -126,8 +176,9 @@ Vec3d NormalAround(const TriangleMesh& surface, const Vec3d& p, Vec3d* nearest) 
   const Vec3d own = normal(at).normalized();
   Vec3d sum = Vec3d::Zero();
   for (const Triangle& t : surface.triangles) {
+    const Vec3d middle = (surface.vertices[t[0]] + surface.vertices[t[1]] + surface.vertices[t[2]]) / 3;
     // A wall's other side faces away from this one.
-    if ((surface.vertices[t[0]] - *nearest).norm() < kNormalReach * size && normal(t).dot(own) > 0) sum += normal(t);
+    if ((middle - *nearest).norm() < kNormalReach * size && normal(t).dot(own) > 0) sum += normal(t);
   }
   return sum.norm() > 0 ? Vec3d(sum.normalized()) : own;
 }
@@ -162,40 +213,20 @@ std::vector<Vec3d> FindCentreLine(const TriangleMesh& surface) {
   const Index end = FarthestOf(DistancesFrom(graph, surface.triangles[0][0]));
   const std::vector<double> distance = DistancesFrom(graph, end);
   const double longest = distance[FarthestOf(distance)];
-  std::vector<Vec3d> sum(kBands, Vec3d::Zero());
-  std::vector<double> weight(kBands, 0);
-  for (const Triangle& t : surface.triangles) {
-    const Vec3d &a = surface.vertices[t[0]], &b = surface.vertices[t[1]], &c = surface.vertices[t[2]];
-    const double mean = (distance[t[0]] + distance[t[1]] + distance[t[2]]) / 3;
-    if (!std::isfinite(mean)) continue;
-    const auto band = static_cast<std::size_t>(std::min(kBands - 1.0, mean / longest * kBands));
-    const double area = (b - a).cross(c - a).norm() / 2;
-    sum[band] += area * (a + b + c) / 3;
-    weight[band] += area;
+  std::vector<Vec3d> line = MiddlesOfBands(surface, [&](const Triangle& t, const Vec3d&) {
+    return (distance[t[0]] + distance[t[1]] + distance[t[2]]) / 3 / longest;
+  });
+  if (line.size() < 3 || !IsLong(surface, line)) return {};
+  // Bands of distance from an end lie oblique to the tube; bands along the line itself do not.
+  for (int round = 0; round < kRounds; ++round) {
+    const double length = LengthOf(line);
+    line = MiddlesOfBands(surface,
+                          [&](const Triangle&, const Vec3d& p) { return FootOn(p, line).along / length; });
+    if (line.size() < 3) return {};
   }
-  std::vector<Vec3d> line;
-  for (std::size_t i = 0; i < sum.size(); ++i) {
-    if (weight[i] > 0) line.push_back(sum[i] / weight[i]);
-  }
-  if (line.size() < 3) return {};
-  for (int k = 0; k < kLineSmoothing; ++k) {
-    const std::vector<Vec3d> old = line;
-    for (std::size_t i = 1; i + 1 < line.size(); ++i) {
-      line[i] = 0.5 * old[i] + 0.25 * (old[i - 1] + old[i + 1]);
-    }
-  }
-  double radius = 0, area = 0;
-  for (const Triangle& t : surface.triangles) {
-    const Vec3d &a = surface.vertices[t[0]], &b = surface.vertices[t[1]], &c = surface.vertices[t[2]];
-    const double share = (b - a).cross(c - a).norm() / 2;
-    radius += share * DistanceToLine((a + b + c) / 3, line);
-    area += share;
-  }
-  radius /= area;
-  if (!(LengthOf(line) > kLeastElongation * 2 * radius)) return {};
-  if (WithPositiveSense(line.back() - line.front()).dot(line.back() - line.front()) < 0) {
-    std::reverse(line.begin(), line.end());
-  }
+  if (!IsLong(surface, line)) return {};
+  const Vec3d chord = line.back() - line.front();
+  if (WithPositiveSense(chord).dot(chord) < 0) std::reverse(line.begin(), line.end());
   return line;
 }
 

@@ -120,6 +120,7 @@ void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Fol
   ReadSi(&map, "tet_edge_mm", Range::Between(0, 50), &import->tet_edge_m);
   ReadSi(&map, "min_edge_mm", Range::Between(0, 5), &import->min_edge_m);
   ReadInteger(&map, "organ_triangles_max", 500, 200000, &import->organ_triangles_max);
+  map.KeepNearer("centreline", "patch");
   if (auto line = map.OptionalMap("centreline")) ReadCentreline(*line, &import->centreline_m);
   if (auto patch = map.OptionalMap("patch")) {
     if (!import->centreline_m.empty()) {
@@ -309,6 +310,7 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesys
   scene.description = root.TextOr("description", "");
   StrictMap organ = root.Map("organ");
   ReadSi(&organ, "density_kg_m3", Range::Between(1, 1e5), &scene.organ_density_kg_m3);
+  organ.KeepNearer("import", "procedural");
   if (organ.Has("import") == organ.Has("procedural")) {
     root.Fail("organ", "needs either `procedural` or `import`");
   }

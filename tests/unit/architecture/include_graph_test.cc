@@ -22,8 +22,8 @@ struct Floor {
   std::vector<std::string> rooms;
 };
 const std::vector<Floor> kFloors = {
-    {"base", {"core", "runtime", "config"}},
-    {"scene", {"format", "builder", "readers", "compiler"}},
+    {"base", {"core", "runtime", "config", "picture"}},
+    {"scene", {"format", "builder", "readers", "compiler", "anatomy"}},
     {"transport", {"control", "bus", "bus/convert", "keys", "bus/dds", "link"}},
     {"nodes", {"app"}},
     {"records", {"recording", "recorder", "log_tools"}},

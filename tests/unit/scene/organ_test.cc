@@ -76,9 +76,11 @@ TEST(OpenSurface, IsRefusedUnlessTheSceneSaysWhatToDo) {
     (void)RepairSurface(OpenTube(), {}, "tube.stl", &report);
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("tube.stl: the surface is not closed (72 open edges); `cap_openings"),
+    EXPECT_NE(std::string(error.what()).find("tube.stl: the surface is not closed (72 open edges in 2 openings, "
+                                             "the longest around ("),
               std::string::npos)
         << error.what();
+    EXPECT_NE(std::string(error.what()).find("`cap_openings: true`"), std::string::npos);
   }
 }
 
@@ -212,8 +214,6 @@ TEST(TetrahedraOfAFile, BeyondRepairAreRefusedByNumber) {
   flat.vertices[3] = Vec3d(0.3, 0.3, 0.001);
   EXPECT_NE(refusal(flat).find("tetrahedron 0 at (0, 0, 0): is flat (least dihedral angle 0.1"), std::string::npos)
       << refusal(flat);
-  flat.vertices[3] = Vec3d(0.3, 0.3, 0);
-  EXPECT_NE(refusal(flat).find("`remesh: true`"), std::string::npos);
 }
 
 // ------------------------------------------------------------------------------------------------ whole scenes

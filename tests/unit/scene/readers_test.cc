@@ -52,6 +52,11 @@ std::string With(std::string text, const std::string& from, const std::string& t
 
 class EveryVariant : public testing::TestWithParam<MeshSample> {};
 
+TEST(AsciiStl, MayEndInTwoWords) {
+  const MeshSample& sample = Sample("stl_ascii");
+  EXPECT_EQ(Refusal(sample, With(sample.bytes, "endsolid", "end solid")), "");
+}
+
 TEST_P(EveryVariant, GivesTheMeshThatWasWritten) {
   const MeshFile read = ParseSample(GetParam(), GetParam().bytes);
   if (GetParam().has_tets) {
@@ -228,7 +233,11 @@ const Fault kFaults[] = {
     {"vtk5_grid_ascii", "OFFSETS vtktypeint64", "OFFSETS string", {"OFFSETS of type 'string'"}},
     {"vtk5_grid_ascii", "0 4 8", "0 9 8", {"cell 0: entries 0 to 9"}},
     {"vtk5_grid_ascii", "0 4 8", "0 4 3", {"cell 1: entries 4 to 3; valid: ascending"}},
-    {"vtu_ascii", "type=\"UnstructuredGrid\"", "type=\"PolyData\"", {"line 3", "'PolyData'; valid: UnstructuredGrid"}},
+    {"vtp", "NumberOfStrips=\"0\"", "NumberOfStrips=\"2\"", {"2 strips of triangles are not read"}},
+    {"vtp", "NumberOfPolys=\"", "NumberOfPolys=\"-", {"valid: a number, 0 and above"}},
+    {"off", "OFF  #", "OFX  #", {"where OFF, COFF or NOFF should be"}},
+    {"off", "\n3 ", "\n2 ", {"a face of 2 corners; valid: at least 3"}},
+    {"vtu_ascii", "type=\"UnstructuredGrid\"", "type=\"ImageData\"", {"line 3", "'ImageData'; valid: UnstructuredGrid, PolyData"}},
     {"vtu_ascii", "LittleEndian", "MiddleEndian", {"byte_order 'MiddleEndian'"}},
     {"vtu_ascii", "UInt32", "UInt16", {"header_type 'UInt16'; valid: UInt32, UInt64"}},
     {"vtu_base64_zlib",

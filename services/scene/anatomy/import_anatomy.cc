@@ -1,0 +1,228 @@
+#include "services/scene/anatomy/import_anatomy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <numeric>
+#include <set>
+
+#include "services/base/config/strict_yaml.h"
+#include "services/base/core/error.h"
+#include "services/base/core/escape.h"
+#include "services/scene/anatomy/surface_nets.h"
+#include "services/scene/builder/geometry.h"
+#include "services/scene/compiler/mesh_repair.h"
+#include "services/scene/compiler/new_scene.h"
+#include "services/scene/compiler/preview.h"
+
+namespace fulcrum::scene {
+namespace {
+
+namespace fs = std::filesystem;
+using config::Range;
+using config::StrictMap;
+using config::StrictYaml;
+
+constexpr int kMostLabels = 64;
+/// Triangles of an organ's file: more than the scene embeds.
+constexpr int kOrganTriangles = 40000;
+constexpr std::size_t kLeastVoxels = 30;  ///< Fewer are noise of a segmentation.
+
+const StrictMap::Choices<SurfaceRole> kRoles = {{"abdominal_wall", SurfaceRole::kAbdominalWall},
+                                                {"retroperitoneum", SurfaceRole::kRetroperitoneum},
+                                                {"pelvis", SurfaceRole::kPelvis},
+                                                {"bladder", SurfaceRole::kBladder},
+                                                {"other", SurfaceRole::kOther}};
+
+std::string NameOf(SurfaceRole role) {
+  return std::string(std::find_if(kRoles.begin(), kRoles.end(), [&](const auto& r) { return r.second == role; })->first);
+}
+
+void WriteText(const fs::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  if (!out.write(text.data(), static_cast<std::streamsize>(text.size())).flush()) {
+    throw InputError(file.string() + ": cannot be written");
+  }
+}
+
+/// Binary little-endian PLY, which keeps shared vertices.
+std::string Ply(const TriangleMesh& mesh) {
+  std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment millimetres; x left, y cranial, z anterior\n"
+                      "element vertex " + std::to_string(mesh.vertices.size()) +
+                      "\nproperty float x\nproperty float y\nproperty float z\nelement face " +
+                      std::to_string(mesh.triangles.size()) + "\nproperty list uchar int vertex_indices\nend_header\n";
+  const auto put = [&](const auto& value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof(value)); };
+  for (const Vec3d& p : mesh.vertices) {
+    for (int k = 0; k < 3; ++k) put(static_cast<float>(p[k]));
+  }
+  for (const Triangle& t : mesh.triangles) {
+    put(std::uint8_t{3});
+    for (const Index v : t) put(static_cast<std::int32_t>(v));
+  }
+  return bytes;
+}
+
+double VolumeOf(const TriangleMesh& mesh) {
+  double volume = 0;
+  const Vec3d o = mesh.vertices[0];
+  for (const Triangle& t : mesh.triangles) {
+    volume += (mesh.vertices[t[0]] - o).dot((mesh.vertices[t[1]] - o).cross(mesh.vertices[t[2]] - o)) / 6;
+  }
+  return volume;
+}
+
+int PiecesOf(const TriangleMesh& mesh) {
+  std::vector<Index> parent(mesh.vertices.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](Index v) {
+    while (parent[v] != v) v = parent[v] = parent[parent[v]];
+    return v;
+  };
+  for (const Triangle& t : mesh.triangles) {
+    for (std::size_t k = 1; k < 3; ++k) parent[root(t[k])] = root(t[0]);
+  }
+  int pieces = 0;
+  for (Index v = 0; v < parent.size(); ++v) pieces += parent[v] == v ? 1 : 0;
+  return pieces;
+}
+
+template <class... Values>
+std::string Text(const char* format, Values... values) {
+  char text[512];
+  std::snprintf(text, sizeof(text), format, values...);
+  return text;
+}
+
+std::string Page(const AnatomyImport& import, const LabelMap& map, const std::vector<LabelReport>& reports) {
+  const Mat3d axes = map.W_from_index.linear();
+  std::string page = "<!DOCTYPE html><meta charset=utf-8><title>" + EscapeHtml(import.name) +
+                     "</title><style>body{font:15px sans-serif;margin:2em;max-width:1300px}td,th{padding:.2em "
+                     ".8em;text-align:right}td:first-child,th:first-child{text-align:left}</style><h1>" +
+                     EscapeHtml(import.name) + "</h1><p>From " + EscapeHtml(import.labels.filename().string()) +
+                     Text(": %d × %d × %d voxels of %.2f × %.2f × %.2f mm.</p>", map.size[0], map.size[1], map.size[2],
+                          axes.col(0).norm(), axes.col(1).norm(), axes.col(2).norm()) +
+                     "<table><tr><th>label<th>voxels<th>ml of voxels<th>ml of mesh<th>difference<th>pieces<th>triangles";
+  for (const LabelReport& r : reports) {
+    page += "<tr><td>" + std::to_string(r.use.label) + " " + EscapeHtml(r.use.name) + (r.use.is_organ ? " (organ)" : "") +
+            Text("<td>%zu<td>%.2f<td>%.2f<td>%+.1f %%<td>%d<td>%zu", r.voxels, r.voxel_volume_ml, r.volume_ml,
+                 100 * (r.volume_ml / r.voxel_volume_ml - 1), r.pieces, r.triangles);
+  }
+  return page + "</table><p>The surface stays within a voxel of the boundary of the voxels. Of an organ in several pieces "
+                "only the largest is used.</p><p><img src=\"" + EscapeHtml(import.name) + ".png\" width=1280></p>";
+}
+
+const LabelUse& OrganOf(const std::vector<LabelUse>& uses) {
+  return *std::find_if(uses.begin(), uses.end(), [](const LabelUse& u) { return u.is_organ; });
+}
+
+}  // namespace
+
+std::vector<LabelUse> ReadLabelUses(const fs::path& file) {
+  StrictYaml yaml = StrictYaml::FromFile(file);
+  StrictMap root = yaml.root();
+  std::vector<LabelUse> uses;
+  std::set<std::string> names;
+  std::set<int> numbers;
+  int organs = 0;
+  for (StrictMap& entry : root.Maps("labels", 1, kMostLabels)) {
+    LabelUse use;
+    use.label = static_cast<int>(entry.Integer("label", 1, 65535));
+    use.name = entry.Text("name", 31);
+    const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_'; };
+    if (!std::all_of(use.name.begin(), use.name.end(), is_plain)) {
+      entry.Fail("name", "must be letters, digits, '-' and '_': it names a file");
+    }
+    use.is_organ = entry.Flag("organ", false);
+    organs += use.is_organ ? 1 : 0;
+    if (use.is_organ && organs > 1) entry.Fail("organ", "there is one already: a scene has one deformable organ");
+    use.role = entry.Choice("role", use.role, kRoles);
+    use.collides = entry.Flag("collides", use.collides);
+    use.triangles_max = static_cast<int>(entry.Integer("triangles_max", use.triangles_max, 100, 100000));
+    if (!names.insert(use.name).second) entry.Fail("name", "is there twice");
+    if (!numbers.insert(use.label).second) entry.Fail("label", "is there twice");
+    uses.push_back(use);
+  }
+  if (organs == 0) root.Fail("labels", "one entry must have `organ: true`");
+  yaml.Finish();
+  return uses;
+}
+
+std::string SuggestLabelUses(const LabelMap& map) {
+  const std::map<int, std::size_t> counts = CountLabels(map);
+  if (counts.empty()) return "";
+  const int largest =
+      std::max_element(counts.begin(), counts.end(), [](const auto& a, const auto& b) { return a.second < b.second; })->first;
+  const double voxel_ml = 1e-3 * std::abs(map.W_from_index.linear().determinant());
+  std::string text = "# What becomes of each label: one deformable organ, which gets the membrane; the others stay fixed. "
+                     "Labels that are left out are ignored.\n# role: abdominal_wall, retroperitoneum, pelvis, bladder or "
+                     "other, which decides the colour.\nlabels:\n";
+  int listed = 0;
+  for (const auto& [label, count] : counts) {
+    if (++listed > kMostLabels) break;
+    text += Text("  - {label: %d, name: label%d%s}   # %.1f ml\n", label, label,
+                 label == largest ? ", organ: true" : ", role: other", static_cast<double>(count) * voxel_ml);
+  }
+  return text;
+}
+
+std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const Progress& progress) {
+  const auto say = [&](const std::string& text) {
+    if (progress) progress(text);
+  };
+  const std::vector<LabelUse> uses = ReadLabelUses(import.map);
+  const LabelMap map = ReadLabelMap(import.labels);
+  say(Text("%d x %d x %d voxels", map.size[0], map.size[1], map.size[2]));
+  const std::map<int, std::size_t> counts = CountLabels(map);
+  std::vector<int> wanted;
+  for (const LabelUse& use : uses) {
+    const auto count = counts.find(use.label);
+    if (count == counts.end() || count->second < kLeastVoxels) {
+      throw InputError(import.map.string() + ": label " + std::to_string(use.label) + " (" + use.name + ") has " +
+                       std::to_string(count == counts.end() ? 0 : count->second) + " voxels in " +
+                       import.labels.string() + "; valid: at least " + std::to_string(kLeastVoxels));
+    }
+    wanted.push_back(use.label);
+  }
+  std::map<int, TriangleMesh> surfaces = SurfacesOf(map, wanted);
+  say("surfaces found");
+  std::error_code error;
+  fs::create_directories(import.out, error);
+  if (error) throw InputError(import.out.string() + ": cannot be made (" + error.message() + ")");
+
+  const double voxel_ml = 1e-3 * std::abs(map.W_from_index.linear().determinant());
+  std::vector<LabelReport> reports;
+  NewScene scene;
+  scene.name = import.name;
+  scene.unit = "mm";
+  scene.facing = Vec3d::UnitZ();
+  for (const LabelUse& use : uses) {
+    TriangleMesh& surface = surfaces.at(use.label);
+    LabelReport report{use, counts.at(use.label), 0, PiecesOf(surface), 0, 0};
+    report.voxel_volume_ml = static_cast<double>(report.voxels) * voxel_ml;
+    report.volume_ml = 1e-3 * VolumeOf(surface);
+    surface = Decimate(surface, use.is_organ ? kOrganTriangles : use.triangles_max);
+    report.triangles = surface.triangles.size();
+    const std::string file = use.name + ".ply";
+    WriteText(import.out / file, Ply(surface));
+    say(Text("%s: %zu voxels, %.1f ml, %d pieces, %zu triangles", file.c_str(), report.voxels, report.volume_ml,
+             report.pieces, report.triangles));
+    if (!use.is_organ) {
+      scene.surroundings += "      - {name: " + use.name + ", role: " + NameOf(use.role) + ", file: " + file +
+                            ", triangles_max: " + std::to_string(use.triangles_max) +
+                            (use.collides ? ", collides: true" : "") + "}\n";
+    }
+    reports.push_back(report);
+  }
+  scene.mesh_text = OrganOf(uses).name + ".ply";
+  scene.mesh = import.out / scene.mesh_text;
+  const fs::path yaml = import.out / (import.name + ".yaml");
+  WriteText(yaml, DescribeNewScene(scene, progress));
+  const CompiledScene compiled = CompileScene(yaml, {}, progress);
+  WriteText(import.out / (import.name + ".png"), PreviewOf(compiled.data.View()));
+  WriteText(import.out / "report.html", Page(import, map, reports));
+  say("wrote " + import.out.string());
+  return reports;
+}
+
+}  // namespace fulcrum::scene

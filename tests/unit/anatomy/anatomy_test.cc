@@ -1,0 +1,243 @@
+// Segmentations: orientation, surfaces between labels, refusals, up to a scene.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <set>
+
+#include "services/base/core/error.h"
+#include "services/scene/anatomy/import_anatomy.h"
+#include "services/scene/anatomy/surface_nets.h"
+#include "services/scene/compiler/compile.h"
+#include "services/scene/format/validate.h"
+#include "tests/support/nifti_writer.h"
+
+namespace fulcrum::scene {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Segmentation : public ::testing::Test {
+ protected:
+  Segmentation() { fs::create_directories(folder_); }
+  ~Segmentation() override { fs::remove_all(folder_); }
+
+  fs::path Write(const std::string& name, const std::string& bytes) {
+    fulcrum::testing::WriteBytes(folder_ / name, bytes);
+    return folder_ / name;
+  }
+  static std::string Refusal(const std::function<void()>& work) {
+    try {
+      work();
+      return "";
+    } catch (const InputError& error) {
+      return error.what();
+    }
+  }
+
+  const fs::path folder_ = fs::temp_directory_path() / ("fulcrum_anatomy_test_" + std::to_string(getpid()));
+};
+
+/// Labels by a function of the place in frame W [mm].
+template <class Label>
+LabelMap Fill(const std::array<int, 3>& size, const Eigen::Affine3d& W_from_index, const Label& label) {
+  LabelMap map;
+  map.size = size;
+  map.W_from_index = W_from_index;
+  map.labels.resize(static_cast<std::size_t>(size[0]) * size[1] * size[2]);
+  for (int k = 0; k < size[2]; ++k) {
+    for (int j = 0; j < size[1]; ++j) {
+      for (int i = 0; i < size[0]; ++i) {
+        map.labels[map.Index(i, j, k)] = static_cast<std::uint16_t>(label(W_from_index * Vec3d(i, j, k)));
+      }
+    }
+  }
+  return map;
+}
+
+/// Marks of a phantom, in frame W [mm]: label 1 lies to the left, 2 cranial, 3 anterior of the middle.
+int Mark(const Vec3d& p) {
+  const Vec3d marks[3] = {{14, 0, 0}, {0, 14, 0}, {0, 0, 14}};
+  for (int m = 0; m < 3; ++m) {
+    if ((p - marks[m]).norm() < 4) return m + 1;
+  }
+  return 0;
+}
+
+Eigen::Affine3d Around(const Mat3d& ras, const std::array<int, 3>& size) {
+  Eigen::Affine3d ras_from_index = Eigen::Affine3d::Identity();
+  ras_from_index.linear() = ras;
+  ras_from_index.translation() = -ras * (0.5 * Vec3d(size[0] - 1, size[1] - 1, size[2] - 1));
+  return ras_from_index;
+}
+
+TEST_F(Segmentation, LeftStaysLeftForEveryOrderAndSenseOfTheAxes) {
+  // All 48 orders and senses, mirrored storage included, and an oblique one; by either way that a header has.
+  std::vector<Mat3d> frames;
+  std::array<int, 3> order{0, 1, 2};
+  do {
+    for (int signs = 0; signs < 8; ++signs) {
+      Mat3d m = Mat3d::Zero();
+      for (int a = 0; a < 3; ++a) m(order[a], a) = (signs >> a & 1) != 0 ? -1 : 1;
+      frames.push_back(m);
+    }
+  } while (std::next_permutation(order.begin(), order.end()));
+  frames.emplace_back(Eigen::AngleAxisd(0.7, Vec3d(1, 2, -1).normalized()).toRotationMatrix());
+  ASSERT_EQ(frames.size(), 49u);
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    const Mat3d ras = frames[f] * Vec3d(1.0, 1.25, 1.5).asDiagonal();
+    const std::array<int, 3> size{52, 42, 36};
+    const Eigen::Affine3d ras_from_index = Around(ras, size);
+    const LabelMap map = Fill(size, Eigen::Affine3d(fulcrum::testing::WFromRas() * ras_from_index), Mark);
+    for (const bool by_quaternion : {false, true}) {
+      const fs::path file = Write(
+          "marks.nii.gz", fulcrum::testing::NiftiBytes(
+                              map, fulcrum::testing::NiftiHeader(map, ras_from_index, by_quaternion)));
+      const LabelMap read = ReadLabelMap(file);
+      const auto surfaces = SurfacesOf(read, {1, 2, 3});
+      ASSERT_EQ(surfaces.size(), 3u);
+      for (int m = 0; m < 3; ++m) {
+        Vec3d middle = Vec3d::Zero();
+        double volume = 0;
+        const TriangleMesh& mesh = surfaces.at(m + 1);
+        for (const Vec3d& p : mesh.vertices) middle += p / static_cast<double>(mesh.vertices.size());
+        for (const Triangle& t : mesh.triangles) {
+          volume += mesh.vertices[t[0]].dot(mesh.vertices[t[1]].cross(mesh.vertices[t[2]])) / 6;
+        }
+        EXPECT_LT((middle - 14 * Vec3d::Unit(m)).norm(), 0.7) << "frame " << f << ", mark " << m;
+        EXPECT_NEAR(volume, 268, 40) << "outward, frame " << f;
+      }
+    }
+  }
+}
+
+TEST_F(Segmentation, SurfacesAreClosedSharedAndWithinAVoxel) {
+  // Two boxes that touch, and a ball of three voxels that smoothing must not lose.
+  const auto label = [](const Vec3d& p) {
+    if ((p - Vec3d(24, 24, 24)).norm() < 2.2) return 7;
+    if (p.x() < 4 || p.y() < 4 || p.z() < 4 || p.y() > 20 || p.z() > 20) return 0;
+    return p.x() < 12 ? 2 : p.x() < 20 ? 5 : 0;
+  };
+  const LabelMap map = Fill({32, 32, 32}, Eigen::Affine3d::Identity(), label);
+  const auto surfaces = SurfacesOf(map, {2, 5, 7});
+  for (const auto& [number, mesh] : surfaces) {
+    std::map<std::pair<Index, Index>, int> edges;
+    for (const Triangle& t : mesh.triangles) {
+      for (std::size_t k = 0; k < 3; ++k) ++edges[{t[k], t[(k + 1) % 3]}];
+    }
+    for (const auto& [edge, count] : edges) {
+      ASSERT_EQ(count, (edges[{edge.second, edge.first}])) << "closed, neighbours of one sense";
+    }
+    for (const Vec3d& p : mesh.vertices) {
+      // A voxel of this label and one of another touch the cube in which the vertex lies.
+      const Vec3d low = p.array().floor().matrix();
+      bool has_own = false, has_other = false;
+      for (int corner = 0; corner < 8; ++corner) {
+        const int found = label(low + Vec3d(corner & 1, corner >> 1 & 1, corner >> 2));
+        (found == number ? has_own : has_other) = true;
+      }
+      EXPECT_TRUE(has_own && has_other) << p.transpose();
+    }
+  }
+  std::set<std::array<double, 3>> of_two;
+  for (const Vec3d& p : surfaces.at(2).vertices) of_two.insert({p.x(), p.y(), p.z()});
+  std::size_t shared = 0;
+  for (const Vec3d& p : surfaces.at(5).vertices) shared += of_two.count({p.x(), p.y(), p.z()});
+  EXPECT_GE(shared, 17u * 17u) << "the whole wall between them";
+  EXPECT_GT(surfaces.at(7).vertices.size(), 20u);
+}
+
+TEST_F(Segmentation, WhatIsNoLabelMapIsRefused) {
+  const LabelMap map = Fill({12, 12, 12}, Eigen::Affine3d::Identity(), [](const Vec3d& p) { return p.x() > 5 ? 1 : 0; });
+  const nifti_1_header header = fulcrum::testing::NiftiHeader(map, Eigen::Affine3d::Identity(), false);
+  const std::string bytes = fulcrum::testing::NiftiBytes(map, header);
+  const auto refusal = [&](const std::string& content) {
+    const fs::path file = Write("x.nii", content);
+    return Refusal([&] { (void)ReadLabelMap(file); });
+  };
+  EXPECT_EQ(refusal(bytes), "");
+  EXPECT_NE(refusal(bytes.substr(0, 1000)).find("cut short"), std::string::npos) << refusal(bytes.substr(0, 1000));
+  EXPECT_NE(refusal("no image at all").find("is no NIfTI file"), std::string::npos);
+  nifti_1_header bad = header;
+  bad.sform_code = 0;
+  EXPECT_NE(refusal(fulcrum::testing::NiftiBytes(map, bad)).find("neither sform nor qform"), std::string::npos);
+  bad = header;
+  bad.scl_slope = 0.5f;
+  EXPECT_NE(refusal(fulcrum::testing::NiftiBytes(map, bad)).find("whole numbers 0 to 65535"), std::string::npos);
+  bad = header;
+  bad.srow_x[0] = 0;
+  EXPECT_NE(refusal(fulcrum::testing::NiftiBytes(map, bad)).find("voxels have a volume"), std::string::npos);
+  bad = header;
+  bad.dim[1] = 30000;
+  EXPECT_NE(refusal(fulcrum::testing::NiftiBytes(map, bad)).find("valid: 2 to 4096"), std::string::npos);
+  EXPECT_NE(Refusal([&] { (void)ReadLabelMap(folder_ / "none.nii"); }).find("is no file"), std::string::npos);
+}
+
+TEST_F(Segmentation, AlteredBytesAreReadOrRefused) {
+  const LabelMap map = Fill({6, 6, 6}, Eigen::Affine3d::Identity(), [](const Vec3d& p) { return p.x() > 2 ? 1 : 0; });
+  const std::string bytes =
+      fulcrum::testing::NiftiBytes(map, fulcrum::testing::NiftiHeader(map, Eigen::Affine3d::Identity(), false));
+  std::mt19937 random(3);
+  for (int round = 0; round < 3000; ++round) {
+    std::string altered = bytes;
+    for (int k = 0; k < 3; ++k) altered[random() % 352] = static_cast<char>(random());
+    if (round % 5 == 0) altered.resize(random() % altered.size());
+    const fs::path file = Write("altered.nii", altered);
+    try {
+      EXPECT_LE(ReadLabelMap(file).labels.size(), kMostVoxels);
+    } catch (const InputError&) {
+    }
+  }
+}
+
+TEST_F(Segmentation, UsesOfLabelsAreChecked) {
+  const auto refusal = [&](const std::string& text) {
+    std::ofstream(folder_ / "labels.yaml") << text;
+    return Refusal([&] { (void)ReadLabelUses(folder_ / "labels.yaml"); });
+  };
+  EXPECT_EQ(refusal("labels:\n  - {label: 1, name: rectum, organ: true}\n  - {label: 2, name: bladder, role: bladder}\n"),
+            "");
+  EXPECT_NE(refusal("labels:\n  - {label: 1, name: a}\n").find("one entry must have `organ: true`"), std::string::npos);
+  EXPECT_NE(refusal("labels:\n  - {label: 1, name: a, organ: true}\n  - {label: 2, name: b, organ: true}\n")
+                .find("there is one already"),
+            std::string::npos);
+  EXPECT_NE(refusal("labels:\n  - {label: 1, name: ../a, organ: true}\n").find("it names a file"), std::string::npos);
+  EXPECT_NE(refusal("labels:\n  - {label: 1, name: a, organ: true}\n  - {label: 1, name: b}\n").find("is there twice"),
+            std::string::npos);
+}
+
+TEST_F(Segmentation, ASegmentationBecomesAScene) {
+  Eigen::Affine3d ras = Around(Vec3d(-1.5, -1.5, 2).asDiagonal(), {64, 64, 64});
+  const LabelMap map = Fill({64, 64, 64}, Eigen::Affine3d(fulcrum::testing::WFromRas() * ras), [](const Vec3d& p) {
+    if (std::hypot(p.x(), p.z()) < 15 && std::abs(p.y()) < 50) return 3;
+    return (p - Vec3d(0, 10, 32)).norm() < 15 ? 9 : 0;
+  });
+  const fs::path file = Write("labels.nii.gz", fulcrum::testing::NiftiBytes(map, fulcrum::testing::NiftiHeader(map, ras, false)));
+  EXPECT_NE(SuggestLabelUses(map).find("{label: 3, name: label3, organ: true}"), std::string::npos);
+  std::ofstream(folder_ / "labels.yaml")
+      << "labels:\n  - {label: 3, name: rectum, organ: true}\n  - {label: 9, name: bladder, role: bladder}\n";
+  const auto reports = ImportAnatomyFiles({"patient", file, folder_ / "labels.yaml", folder_ / "patient"}, {});
+  ASSERT_EQ(reports.size(), 2u);
+  for (const LabelReport& r : reports) {
+    EXPECT_NEAR(r.volume_ml, r.voxel_volume_ml, 0.06 * r.voxel_volume_ml);
+    EXPECT_EQ(r.pieces, 1);
+  }
+  for (const char* name : {"patient.yaml", "patient.png", "report.html", "rectum.ply", "bladder.ply"}) {
+    EXPECT_TRUE(fs::exists(folder_ / "patient" / name)) << name;
+  }
+  const SceneData data = CompileScene(folder_ / "patient" / "patient.yaml", {}, {}).data;
+  const auto fault = FindFault(data.View());
+  EXPECT_FALSE(fault) << fault->section << ": " << fault->reason;
+  EXPECT_EQ(std::string(data.View().static_surfaces.back().name), "bladder");
+  std::ofstream(folder_ / "labels.yaml") << "labels:\n  - {label: 4, name: rectum, organ: true}\n";
+  EXPECT_NE(Refusal([&] {
+              (void)ImportAnatomyFiles({"patient", file, folder_ / "labels.yaml", folder_ / "patient"}, {});
+            }).find("label 4 (rectum) has 0 voxels"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace fulcrum::scene
