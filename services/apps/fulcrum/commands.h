@@ -33,6 +33,7 @@ ExitCode Inputs(const Words& words);
 ExitCode Console(const Words& words);
 ExitCode Reference(const Words& words);
 ExitCode Scene(const Words& words);
+ExitCode ImportAnatomy(const Words& words);
 ExitCode Assess(const Words& words);
 ExitCode Trainee(const Words& words);
 ExitCode Questionnaire(const Words& words);

@@ -15,6 +15,7 @@
 #include "services/scene/compiler/mesh_repair.h"
 #include "services/scene/compiler/new_scene.h"
 #include "services/scene/compiler/preview.h"
+#include "services/scene/compiler/scene_yaml.h"
 
 namespace fulcrum::scene {
 namespace {
@@ -28,16 +29,6 @@ constexpr int kMostLabels = 64;
 /// Triangles of an organ's file: more than the scene embeds.
 constexpr int kOrganTriangles = 40000;
 constexpr std::size_t kLeastVoxels = 30;  ///< Fewer are noise of a segmentation.
-
-const StrictMap::Choices<SurfaceRole> kRoles = {{"abdominal_wall", SurfaceRole::kAbdominalWall},
-                                                {"retroperitoneum", SurfaceRole::kRetroperitoneum},
-                                                {"pelvis", SurfaceRole::kPelvis},
-                                                {"bladder", SurfaceRole::kBladder},
-                                                {"other", SurfaceRole::kOther}};
-
-std::string NameOf(SurfaceRole role) {
-  return std::string(std::find_if(kRoles.begin(), kRoles.end(), [&](const auto& r) { return r.second == role; })->first);
-}
 
 void WriteText(const fs::path& file, const std::string& text) {
   std::ofstream out(file, std::ios::binary);
@@ -136,7 +127,12 @@ std::vector<LabelUse> ReadLabelUses(const fs::path& file) {
     use.is_organ = entry.Flag("organ", false);
     organs += use.is_organ ? 1 : 0;
     if (use.is_organ && organs > 1) entry.Fail("organ", "there is one already: a scene has one deformable organ");
-    use.role = entry.Choice("role", use.role, kRoles);
+    const std::string role = entry.TextOr("role", RoleName(use.role), 31);
+    try {
+      use.role = RoleNamed(role);
+    } catch (const InputError& error) {
+      entry.Fail("role", error.what());
+    }
     use.collides = entry.Flag("collides", use.collides);
     use.triangles_max = static_cast<int>(entry.Integer("triangles_max", use.triangles_max, 100, 100000));
     if (!names.insert(use.name).second) entry.Fail("name", "is there twice");
@@ -195,7 +191,6 @@ std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const P
   NewScene scene;
   scene.name = import.name;
   scene.unit = "mm";
-  scene.facing = Vec3d::UnitZ();
   for (const LabelUse& use : uses) {
     TriangleMesh& surface = surfaces.at(use.label);
     LabelReport report{use, counts.at(use.label), 0, PiecesOf(surface), 0, 0};
@@ -208,9 +203,8 @@ std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const P
     say(Text("%s: %zu voxels, %.1f ml, %d pieces, %zu triangles", file.c_str(), report.voxels, report.volume_ml,
              report.pieces, report.triangles));
     if (!use.is_organ) {
-      scene.surroundings += "      - {name: " + use.name + ", role: " + NameOf(use.role) + ", file: " + file +
-                            ", triangles_max: " + std::to_string(use.triangles_max) +
-                            (use.collides ? ", collides: true" : "") + "}\n";
+      scene.surroundings.push_back(
+          {use.name, use.role, import.out / file, Vec3f::Zero(), use.triangles_max, use.collides});
     }
     reports.push_back(report);
   }

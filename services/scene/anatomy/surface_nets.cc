@@ -7,10 +7,10 @@
 namespace fulcrum::scene {
 namespace {
 
-constexpr int kSmoothing = 20;
+constexpr int kSmoothing = 60;
 /// Shares of the way to the mean of the neighbours, in turns: the second step undoes the shrinking of the first, not the
 /// smoothing (Taubin 1995).
-constexpr double kRelax[2] = {0.5, -0.52};
+constexpr double kRelax[2] = {0.6, -0.613};
 constexpr double kLargest = 0.49;  ///< Of a voxel, away from the middle of the vertex' cube.
 
 /// A vertex in the middle of eight voxels of which not all have one label, with neighbours across its cube's faces.

@@ -68,20 +68,89 @@ void ChooseMembrane(const SheetSize& size, MembraneSettings* m) {
   m->binding_reach_m = m->gap_m + kReach_m;
 }
 
-/// A trocar at this distance and bearing from the membrane's middle, raised until its shaft is clear of everything on
-/// its way to `target`.
-Vec3d Trocar(double x, double y, double z, const Vec3d& target, const Anatomy& anatomy) {
-  constexpr double kClear = 0.006, kStep = 0.005, kHighest = 0.12, kNear = 0.02;
-  for (;; z += kStep) {
-    const Vec3d trocar(x, y, z);
-    const Vec3d along = trocar - target;
-    const auto blocks = [&](const Vec3d& p) {
-      const double f = (p - target).dot(along) / along.squaredNorm();
-      return f * along.norm() > kNear && f < 1 && (target + f * along - p).norm() < kClear;
-    };
-    const bool is_clear = std::none_of(anatomy.organ_vertices.begin(), anatomy.organ_vertices.end(), blocks) &&
-                          std::none_of(anatomy.sheet.begin(), anatomy.sheet.end(), blocks);
-    if (is_clear || z >= kHighest) return trocar;
+/// Everything that a shaft or a line of sight can meet.
+std::vector<Vec3d> ObstaclesOf(const Anatomy& anatomy) {
+  std::vector<Vec3d> obstacles = anatomy.organ_vertices;
+  obstacles.insert(obstacles.end(), anatomy.sheet.begin(), anatomy.sheet.end());
+  for (const Anatomy::Surrounding& s : anatomy.surroundings) {
+    obstacles.insert(obstacles.end(), s.vertices.begin(), s.vertices.end());
+  }
+  return obstacles;
+}
+
+/// Distance of the nearest obstacle from the line between `from` and `target`, without its last 20 mm; at most `most`.
+double Clearance(const std::vector<Vec3d>& obstacles, const Vec3d& from, const Vec3d& target, double most) {
+  constexpr double kNear = 0.02;
+  const Vec3d along = from - target;
+  const double length = along.norm();
+  double least = most;
+  for (const Vec3d& p : obstacles) {
+    const double f = std::clamp((p - target).dot(along) / (length * length), std::min(1.0, kNear / length), 1.0);
+    least = std::min(least, (target + f * along - p).norm());
+  }
+  return least;
+}
+
+/// The place of a trocar around the membrane's middle, at this distance, that has enough room for its shaft on the way
+/// to `target`: the wanted one, else a steeper one, else one with another bearing; if none has, the one with the most.
+Vec3d Trocar(const Vec3d& wanted, const Vec3d& target, double enough, const std::vector<Vec3d>& obstacles) {
+  constexpr int kSteeper = 5, kBearings = 9;
+  constexpr double kStep_rad = 0.22, kTurn_rad = 0.35;
+  const double distance = wanted.norm(), bearing = std::atan2(wanted.y(), wanted.x()),
+               elevation = std::asin(wanted.z() / distance);
+  Vec3d best = wanted;
+  double most = -1;
+  for (int b = 0; b < kBearings; ++b) {
+    // 0, 1, -1, 2, -2 ... turns.
+    const double turned = bearing + kTurn_rad * ((b + 1) / 2) * (b % 2 != 0 ? 1 : -1);
+    for (int e = 0; e < kSteeper; ++e) {
+      const double up = std::min(elevation + kStep_rad * e, 1.4);
+      const Vec3d trocar = distance * Vec3d(std::cos(up) * std::cos(turned), std::cos(up) * std::sin(turned), std::sin(up));
+      const double room = Clearance(obstacles, trocar, target, enough);
+      if (room >= enough) return trocar;
+      if (room > most) {
+        most = room;
+        best = trocar;
+      }
+    }
+  }
+  return best;
+}
+
+const Vec3d kScopeDirection = Vec3d(0.05, -0.71, 0.70).normalized();
+constexpr double kScopeRoom_m = 0.02, kShaftRoom_m = 0.006;
+
+double ScopeDistance(const SheetSize& size) {
+  return std::clamp(1.2 * std::max(size.width, 0.5 * size.length), 0.06, 0.14);
+}
+
+/// Where something stands before the membrane, tries the organ's other sides and takes the first that can be seen, else
+/// the best of them.
+template <class Take>
+void ChooseSide(NewScene* scene, ImportSettings* import, const Take& take, Anatomy* anatomy) {
+  constexpr double kDistance_m = 0.09;
+  const auto room = [&](const Anatomy& at) {
+    const std::vector<Vec3d> obstacles = ObstaclesOf(at);
+    const Vec3d scope = Trocar(kDistance_m * kScopeDirection, Vec3d::Zero(), kScopeRoom_m, obstacles);
+    return Clearance(obstacles, scope, Vec3d::Zero(), kScopeRoom_m);
+  };
+  double most = room(*anatomy);
+  for (const Vec3d& side : {Vec3d(0, 0, 1), Vec3d(1, 0, 1), Vec3d(-1, 0, 1), Vec3d(1, 0, 0), Vec3d(-1, 0, 0), Vec3d(0, 0, -1)}) {
+    if (most >= kScopeRoom_m) return;
+    const std::optional<Vec3f> before = import->facing;
+    import->facing = side.cast<float>();
+    try {
+      Anatomy other = take();
+      const double here = room(other);
+      if (here > most) {
+        most = here;
+        scene->facing = side;
+        *anatomy = std::move(other);
+        continue;
+      }
+    } catch (const InputError&) {  // No membrane lies on that side.
+    }
+    import->facing = before;
   }
 }
 
@@ -99,7 +168,12 @@ std::string OrganText(const NewScene& scene, const ImportSettings& import, bool 
     text += "    # patch: {at_mm: [x, y, z], width_mm: 60, length_mm: 80}   to move it, in the frame of the file\n";
   }
   text += Text("    cavity_mm: %.0f\n", 1e3 * import.cavity_m);
-  return scene.surroundings.empty() ? text : text + "    surroundings:\n" + scene.surroundings;
+  if (!scene.surroundings.empty()) text += "    surroundings:\n";
+  for (const ImportSettings::Surrounding& s : scene.surroundings) {
+    text += "      - {name: " + s.name + ", role: " + std::string(RoleName(s.role)) + ", file: " + s.file.filename().string() +
+            Text(", triangles_max: %d%s}\n", s.triangles_max, s.collides ? ", collides: true" : "");
+  }
+  return text;
 }
 
 std::string ScriptText(const SheetSize& size, const Vec3d& hook_wait_mm) {
@@ -166,6 +240,7 @@ std::string DescribeNewScene(const NewScene& given, const Progress& progress) {
   settings.membrane.rows = 101;
   settings.membrane.cols = 64;
   settings.membrane.gap_m = 0.003;
+  import.surroundings = scene.surroundings;
   const auto take = [&] {
     try {
       return ImportAnatomy(settings, progress);
@@ -175,16 +250,18 @@ std::string DescribeNewScene(const NewScene& given, const Progress& progress) {
       return ImportAnatomy(settings, progress);
     }
   };
-  const Anatomy anatomy = take();
+  Anatomy anatomy = take();
+  if (!scene.facing && !scene.surroundings.empty()) ChooseSide(&scene, &import, take, &anatomy);
+  const std::vector<Vec3d> obstacles = ObstaclesOf(anatomy);
   const SheetSize size = SizeOf(settings.membrane, anatomy.sheet);
   ChooseMembrane(size, &settings.membrane);
 
   double radius = 0;
   for (const Vec3d& p : anatomy.organ_vertices) radius = std::max(radius, p.norm());
   import.cavity_m = std::max(0.085, 1.15 * radius);
-  const double distance_mm = std::clamp(1.2e3 * std::max(size.width, 0.5 * size.length), 60.0, 140.0);
-  const Vec3d grasper = 1e3 * Trocar(-0.085, -0.045, 0.092, Vec3d(-0.01, 0, 0), anatomy);
-  const Vec3d hook = 1e3 * Trocar(0.098, 0, 0.034, Vec3d(0.003, 0, 0), anatomy);
+  const Vec3d scope = 1e3 * Trocar(ScopeDistance(size) * kScopeDirection, Vec3d::Zero(), kScopeRoom_m, obstacles);
+  const Vec3d grasper = 1e3 * Trocar(Vec3d(-0.085, -0.045, 0.092), Vec3d(-0.01, 0, 0), kShaftRoom_m, obstacles);
+  const Vec3d hook = 1e3 * Trocar(Vec3d(0.098, 0, 0.034), Vec3d(0.003, 0, 0), kShaftRoom_m, obstacles);
   const MembraneSettings& m = settings.membrane;
   std::string text = "# " + Text("Made from %s: a membrane of %.0f x %.0f mm.", scene.mesh.filename().c_str(),
                                  1e3 * size.width, 1e3 * size.length) +
@@ -207,7 +284,7 @@ std::string DescribeNewScene(const NewScene& given, const Progress& progress) {
   text += "haptics: {force_limit_N: 3.3, slew_N_per_ms: 0.4, force_scale: 0.3}\n\n";
   text += Text("render:\n  width: 960\n  height: 540\n  rate_Hz: 15\n  png_rate_Hz: 2\n  scope_tip_mm: [%.0f, %.0f, %.0f]\n"
                "  scope_target_mm: [0, 0, 0]\n  fov_deg: 60\n  scope_angle_deg: 30\n\n",
-               0.05 * distance_mm, -0.71 * distance_mm, 0.7 * distance_mm);
+               scope.x(), scope.y(), scope.z());
   return text + ScriptText(size, Vec3d(10, -40, 5));
 }
 

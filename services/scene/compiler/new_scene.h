@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "services/scene/builder/scene_settings.h"
 #include "services/scene/compiler/compile.h"
 
 namespace fulcrum::scene {
@@ -17,7 +19,9 @@ struct NewScene {
   std::string unit;                  ///< Empty: the one in which the organ has a likely size.
   std::optional<Vec3d> at_mm;        ///< Middle of the membrane, in the frame of the file.
   std::optional<Vec3d> facing;       ///< From the organ to the membrane, in the frame of the file.
-  std::string surroundings;          ///< Lines of the list `surroundings`, indented by six; may be empty.
+  /// In files beside that of the organ, in the same frame. Scope and tools are placed clear of them and, without
+  /// `facing`, the membrane on a side that can be seen.
+  std::vector<ImportSettings::Surrounding> surroundings;
 };
 
 /// The text of the description. Imports the mesh on the way, which decides what it says. Throws InputError.

@@ -373,6 +373,19 @@ SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::fil
   return ReadFile(file, data, changes, true);
 }
 
+std::string_view RoleName(SurfaceRole role) {
+  return std::find_if(kRoles.begin(), kRoles.end(), [&](const auto& r) { return r.second == role; })->first;
+}
+
+SurfaceRole RoleNamed(const std::string& name) {
+  std::string valid;
+  for (const auto& [word, role] : kRoles) {
+    if (word == name) return role;
+    valid += (valid.empty() ? "" : ", ") + std::string(word);
+  }
+  throw InputError("role '" + name + "'; valid: " + valid);
+}
+
 double LengthUnit(const std::string& name) {
   for (const auto& [unit, metres] : kLengthUnits) {
     if (unit == name) return metres;

@@ -26,6 +26,11 @@ SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::fil
 /// directory.
 SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, const std::filesystem::path& data);
 
+/// The word for a role in a description.
+std::string_view RoleName(SurfaceRole role);
+/// The role that a word names. Throws InputError.
+SurfaceRole RoleNamed(const std::string& name);
+
 /// Metres per unit m, cm, mm or um. Throws InputError for another one.
 double LengthUnit(const std::string& name);
 

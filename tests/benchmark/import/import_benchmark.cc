@@ -13,6 +13,7 @@
 
 #include "services/base/runtime/child_process.h"
 #include "services/scene/format/scene_file.h"
+#include "tests/benchmark/import/anatomy_benchmark.h"
 #include "tests/benchmark/import/organ_shapes.h"
 #include "tests/benchmark/report.h"
 #include "tests/unit/scene/mesh_writers.h"
@@ -124,7 +125,10 @@ int main(int argc, char** argv) {
   if (!report.Wants("import.")) return 0;
   const fs::path folder = fs::temp_directory_path() / ("fulcrum_import_" + std::to_string(getpid()));
   fs::create_directories(folder);
-  Run(&report, folder);
+  if (report.Wants("import.anatomy") || report.Wants("import.hausdorff") || report.Wants("import.orientation")) {
+    MeasureAnatomy(&report, folder);
+  }
+  if (report.Wants("import.meshes") || report.Wants("import.organ")) Run(&report, folder);
   fs::remove_all(folder);
   return 0;
 }

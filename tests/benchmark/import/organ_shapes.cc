@@ -314,6 +314,22 @@ scene::TriangleMesh SurfaceOfShape(const Shape& shape, double reach, int cells) 
   return mesh;
 }
 
+std::vector<Part> Pelvis() {
+  const Shape rectum = Tube({{0, -80, -20}, {2, -40, -34}, {0, 0, -30}, {6, 40, -18}, {0, 80, -24}}, 16, 16);
+  const Shape bladder = Ball({0, -10, 34}, 30), prostate = Ball({0, -52, 14}, 17);
+  const Shape left = Tube({{40, 90, -20}, {44, 30, -10}, {30, -10, 4}}, 3, 3),
+              right = Tube({{-40, 90, -20}, {-44, 30, -10}, {-30, -10, 4}}, 3, 3);
+  const Shape shell = [](const Vec3d& p) { return std::abs(p.norm() - 100) - 5; };
+  const Shape back = [=](const Vec3d& p) { return std::max(shell(p), p.z() + 30); };
+  // The ureters end in the bladder, the rectum at the wall.
+  return {{"rectum", 1, true, Without(rectum, back)},
+          {"bladder", 2, false, bladder},
+          {"prostate", 3, false, Without(prostate, rectum)},
+          {"left_ureter", 4, false, Without(left, bladder)},
+          {"right_ureter", 5, false, Without(right, bladder)},
+          {"wall", 6, false, back}};
+}
+
 std::vector<Organ> Organs() {
   const char* kFormats[] = {"stl", "text.stl", "obj", "ply", "vtk", "vtp", "off"};  // Of surfaces.
   constexpr int kCells = 44;

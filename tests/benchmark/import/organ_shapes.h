@@ -27,4 +27,13 @@ scene::TriangleMesh SurfaceOfShape(const Shape& shape, double reach, int cells);
 /// Organs with and without faults, in every format that can be read, in a fixed order.
 std::vector<Organ> Organs();
 
+/// Organs of a pelvis that do not overlap; two of them touch.
+struct Part {
+  std::string name;
+  int label;
+  bool is_organ;
+  Shape shape;  ///< An exact distance near the surface.
+};
+std::vector<Part> Pelvis();
+
 }  // namespace fulcrum::benchmark
