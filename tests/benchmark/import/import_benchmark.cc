@@ -1,5 +1,6 @@
-// How many organs of other people's files become a scene without a word on centre line or facing, and how long it takes.
-// Each is compiled by the program, as a user would, with a limit of time.
+// How many organs of other people's files become a scene without a word on centre line or facing, how long it takes, and
+// whether a grasper can take hold of the membrane of the scene made around it and lift it. Each is compiled by the
+// program, as a user would, with a limit of time.
 #include <signal.h>
 #include <unistd.h>
 
@@ -11,6 +12,7 @@
 #include <string>
 #include <thread>
 
+#include "physics_node/simulation/script_player.h"
 #include "services/base/runtime/child_process.h"
 #include "services/scene/format/scene_file.h"
 #include "tests/benchmark/import/anatomy_benchmark.h"
@@ -56,11 +58,11 @@ struct Result {
   std::string last;
 };
 
-Result Compile(const fs::path& yaml, const fs::path& out, const fs::path& log) {
+Result Compile(const std::vector<std::string>& words, const fs::path& log) {
   const auto start = std::chrono::steady_clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
-  runtime::ChildProcess compiler = runtime::ChildProcess::Start(
-      fs::path(FULCRUM_BIN_DIR) / "scene_compiler", {yaml.string(), "--out", out.string()}, log);
+  runtime::ChildProcess compiler =
+      runtime::ChildProcess::Start(fs::path(FULCRUM_BIN_DIR) / "scene_compiler", words, log);
   Result result;
   for (;;) {
     const auto end = compiler.Poll();
@@ -80,9 +82,33 @@ Result Compile(const fs::path& yaml, const fs::path& out, const fs::path& log) {
   return result;
 }
 
+/// Empty, or what went wrong in the first eight seconds of the scene made around the mesh: no grasp, or not stable.
+std::string Operate(const fs::path& mesh, const fs::path& folder) {
+  constexpr double kUntil_s = 8, kLifted_s = 6.5;
+  constexpr float kFar_m = 0.06f;
+  const fs::path yaml = folder / "new.yaml", compiled = folder / "new.fulcrum", log = folder / "new.log";
+  fs::remove(yaml);
+  for (const auto& words : {std::vector<std::string>{"--new", "new", "--from", mesh.string(), "--out", yaml.string()},
+                            std::vector<std::string>{yaml.string(), "--out", compiled.string()}}) {
+    if (const Result result = Compile(words, log); !result.compiled) return result.last;
+  }
+  const scene::SceneFile file(compiled);
+  const SceneView& scene = file.view();
+  physics::TissueSimulation simulation(scene);
+  bool holds = false;
+  for (int i = 0; i < static_cast<int>(kUntil_s / static_cast<double>(scene.physics.dt_s)); ++i) {
+    const double time_s = i * static_cast<double>(scene.physics.dt_s);
+    simulation.Step(physics::ScriptedTools(scene, time_s));
+    holds = holds || (time_s > kLifted_s && simulation.grasp(0).holding());
+  }
+  if (simulation.quarantined() > 0) return std::to_string(simulation.quarantined()) + " particles quarantined";
+  if (!(simulation.MaxDisplacement() < kFar_m)) return "tissue flies";
+  return holds ? "" : "the grasper holds nothing";
+}
+
 void Run(Report* report, const fs::path& folder) {
   std::vector<double> compile_s;
-  int sound = 0, compiled = 0, refused_late = 0, wrongly = 0;
+  int sound = 0, compiled = 0, operated = 0, refused_late = 0, wrongly = 0;
   double slowest_refusal = 0;
   std::size_t done = 0;
   const std::vector<Organ> organs = Organs();
@@ -93,7 +119,13 @@ void Run(Report* report, const fs::path& folder) {
     std::ofstream(yaml) << "name: organ\norgan:\n  import:\n    organ: " << mesh.filename().string() << "\n"
                         << (organ.options.empty() ? "" : "    " + organ.options + "\n")
                         << "membrane: {rows: 101, cols: 64}\nphysics: {mode: accurate}\n";
-    const Result result = Compile(yaml, folder / "organ.fulcrum", folder / "organ.log");
+    const Result result =
+        Compile({yaml.string(), "--out", (folder / "organ.fulcrum").string()}, folder / "organ.log");
+    std::string fault;
+    if (result.compiled && organ.is_sound) {
+      fault = Operate(mesh, folder);
+      operated += fault.empty() ? 1 : 0;
+    }
     sound += organ.is_sound ? 1 : 0;
     compiled += organ.is_sound && result.compiled ? 1 : 0;
     wrongly += !organ.is_sound && result.compiled ? 1 : 0;
@@ -104,11 +136,15 @@ void Run(Report* report, const fs::path& folder) {
       refused_late += result.seconds > kRefusal_s ? 1 : 0;
     }
     std::fprintf(stderr, "%-34s %-9s %6.2f s  %s\n", organ.name.c_str(), organ.file.c_str(), result.seconds,
-                 result.compiled ? "compiled" : result.timed_out ? "no end" : result.last.c_str());
+                 !fault.empty()    ? fault.c_str()
+                 : result.compiled ? "operated"
+                 : result.timed_out ? "no end"
+                                    : result.last.c_str());
     fs::remove(mesh);
   }
   report->Add("import.meshes", sound, "count");
   report->Add("import.meshes_ok_pct", 100.0 * compiled / std::max(sound, 1), "%");
+  report->Add("import.meshes_operated_pct", 100.0 * operated / std::max(sound, 1), "%");
   report->Add("import.wrongly_compiled", wrongly, "count");
   report->Add("import.refused_late", refused_late, "count");
   report->Add("import.refusal_s_max", slowest_refusal, "s");
