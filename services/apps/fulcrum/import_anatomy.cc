@@ -8,11 +8,12 @@ namespace fulcrum::supervisor::cli {
 
 ExitCode ImportAnatomy(const Words& words) {
   const char* usage =
-      "usage: fulcrum import-anatomy LABELS.nii.gz                            prints a map to be edited\n"
-      "       fulcrum import-anatomy LABELS.nii.gz --map LABELS.yaml --out DIR\n\n"
-      "Makes a scene of a patient's segmentation, a NIfTI label map: DIR holds a mesh per label, the scene with\n"
-      "membrane, tools and script around the organ, its picture, and report.html. Left stays left: the position in\n"
-      "the patient comes from the file (sform, qform).\n\n"
+      "usage: fulcrum import-anatomy LABELS                          prints a map to be edited\n"
+      "       fulcrum import-anatomy LABELS --map LABELS.yaml --out DIR\n\n"
+      "Makes a scene of a patient's segmentation. LABELS is a NIfTI label map, or a folder with a surface per organ.\n"
+      "DIR then holds a mesh per organ, the scene with membrane, tools and script around one of them, its picture,\n"
+      "and report.html. Left stays left: the position in the patient comes from the NIfTI file (sform, qform), for\n"
+      "surfaces from the map (axes: LPS or RAS).\n\n"
       "Example:\n"
       "  fulcrum import-anatomy pelvis.nii.gz > labels.yaml     then give the labels their names and roles\n"
       "  fulcrum import-anatomy pelvis.nii.gz --map labels.yaml --out pelvis && fulcrum up pelvis/pelvis.yaml\n";

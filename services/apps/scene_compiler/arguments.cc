@@ -10,7 +10,7 @@ namespace {
 constexpr const char* kUsage =
     R"(usage: scene_compiler SCENE.yaml --out FILE [options]
        scene_compiler --new NAME --from MESH [--unit U] [--at X,Y,Z] [--facing X,Y,Z] [--out FILE.yaml]
-       scene_compiler --anatomy LABELS.nii.gz [--map LABELS.yaml --out DIR]
+       scene_compiler --anatomy LABELS.nii.gz|FOLDER [--map LABELS.yaml --out DIR]
        scene_compiler --info FILE [--preview FILE.png]
        scene_compiler --source FILE
        scene_compiler --list [DIR]
@@ -37,9 +37,9 @@ Options:
   --unit U                 of the mesh: m, cm, mm, um (default: the one in which it has the size of an organ)
   --at X,Y,Z               the middle of the membrane, in mm in the frame of the mesh (default: found)
   --facing X,Y,Z           direction from the organ to the membrane, in the frame of the mesh (default: found)
-  --anatomy FILE           a segmentation (NIfTI label map): writes a mesh per label, a scene and a report into --out;
-                           without --map, prints a map to be edited
-  --map FILE               what becomes of each label
+  --anatomy FILE           a segmentation, as NIfTI label map or folder of surfaces: writes a mesh per organ, a scene and
+                           a report into --out; without --map, prints a map to be edited
+  --map FILE               what becomes of each label or surface
   --quiet                  print no progress and no report
   --info FILE              print the content and quality of a compiled scene
   --source FILE            print the effective YAML of a compiled scene

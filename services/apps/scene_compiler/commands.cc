@@ -197,9 +197,7 @@ void ImportLabels(const Arguments& arguments) {
   const Stages stages(arguments.quiet);
   const Limit limit(arguments.limit_s);
   if (arguments.map.empty()) {
-    const std::string suggestion = scene::SuggestLabelUses(scene::ReadLabelMap(arguments.anatomy));
-    if (suggestion.empty()) throw InputError(arguments.anatomy + ": every voxel is 0: nothing is labelled");
-    std::cout << suggestion;
+    std::cout << scene::SuggestLabelUses(arguments.anatomy);
     std::fprintf(stderr, "edit these lines, save them as labels.yaml and give --map labels.yaml --out DIR\n");
     return;
   }

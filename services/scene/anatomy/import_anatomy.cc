@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <functional>
+#include <map>
 #include <numeric>
 #include <set>
 
@@ -86,21 +88,67 @@ std::string Text(const char* format, Values... values) {
 }
 
 std::string Page(const AnatomyImport& import, const LabelMap& map, const std::vector<LabelReport>& reports) {
+  const bool has_voxels = !map.labels.empty();
   const Mat3d axes = map.W_from_index.linear();
   std::string page = "<!DOCTYPE html><meta charset=utf-8><title>" + EscapeHtml(import.name) +
                      "</title><style>body{font:15px sans-serif;margin:2em;max-width:1300px}td,th{padding:.2em "
                      ".8em;text-align:right}td:first-child,th:first-child{text-align:left}</style><h1>" +
-                     EscapeHtml(import.name) + "</h1><p>From " + EscapeHtml(import.labels.filename().string()) +
-                     Text(": %d × %d × %d voxels of %.2f × %.2f × %.2f mm.</p>", map.size[0], map.size[1], map.size[2],
-                          axes.col(0).norm(), axes.col(1).norm(), axes.col(2).norm()) +
-                     "<table><tr><th>label<th>voxels<th>ml of voxels<th>ml of mesh<th>difference<th>pieces<th>triangles";
-  for (const LabelReport& r : reports) {
-    page += "<tr><td>" + std::to_string(r.use.label) + " " + EscapeHtml(r.use.name) + (r.use.is_organ ? " (organ)" : "") +
-            Text("<td>%zu<td>%.2f<td>%.2f<td>%+.1f %%<td>%d<td>%zu", r.voxels, r.voxel_volume_ml, r.volume_ml,
-                 100 * (r.volume_ml / r.voxel_volume_ml - 1), r.pieces, r.triangles);
+                     EscapeHtml(import.name) + "</h1><p>From " + EscapeHtml(import.labels.filename().string());
+  if (has_voxels) {
+    page += Text(": %d × %d × %d voxels of %.2f × %.2f × %.2f mm", map.size[0], map.size[1], map.size[2],
+                 axes.col(0).norm(), axes.col(1).norm(), axes.col(2).norm());
   }
-  return page + "</table><p>The surface stays within a voxel of the boundary of the voxels. Of an organ in several pieces "
-                "only the largest is used.</p><p><img src=\"" + EscapeHtml(import.name) + ".png\" width=1280></p>";
+  page += ".</p><table><tr><th>organ";
+  page += has_voxels ? "<th>label<th>voxels<th>ml of voxels<th>ml of mesh<th>difference" : "<th>ml of mesh";
+  page += "<th>pieces<th>triangles";
+  for (const LabelReport& r : reports) {
+    page += "<tr><td>" + EscapeHtml(r.use.name) + (r.use.is_organ ? " (deformable)" : "");
+    page += has_voxels ? Text("<td>%d<td>%zu<td>%.2f<td>%.2f<td>%+.1f %%", r.use.label, r.voxels, r.voxel_volume_ml,
+                              r.volume_ml, 100 * (r.volume_ml / r.voxel_volume_ml - 1))
+                       : Text("<td>%.2f", r.volume_ml);
+    page += Text("<td>%d<td>%zu", r.pieces, r.triangles);
+  }
+  page += "</table><p>";
+  if (has_voxels) page += "Surfaces stay within a voxel of the boundary of the voxels. ";
+  return page + "Of an organ in several pieces only the largest is used.</p><p><img src=\"" + EscapeHtml(import.name) +
+         ".png\" width=1280></p>";
+}
+
+using Say = std::function<void(const std::string&)>;
+
+/// By the uses' names.
+std::map<std::string, TriangleMesh> SurfacesOfLabels(const AnatomyImport& import, const std::vector<LabelUse>& uses,
+                                                     const Say& say, LabelMap* map,
+                                                     std::map<int, std::size_t>* counts) {
+  *map = ReadLabelMap(import.labels);
+  say(Text("%d x %d x %d voxels", map->size[0], map->size[1], map->size[2]));
+  *counts = CountLabels(*map);
+  std::vector<int> wanted;
+  for (const LabelUse& use : uses) {
+    const auto count = counts->find(use.label);
+    if (count == counts->end() || count->second < kLeastVoxels) {
+      throw InputError(import.map.string() + ": label " + std::to_string(use.label) + " (" + use.name + ") has " +
+                       std::to_string(count == counts->end() ? 0 : count->second) + " voxels in " +
+                       import.labels.string() + "; valid: at least " + std::to_string(kLeastVoxels));
+    }
+    wanted.push_back(use.label);
+  }
+  std::map<int, TriangleMesh> of_labels = SurfacesOf(*map, wanted);
+  say("surfaces found");
+  std::map<std::string, TriangleMesh> surfaces;
+  for (const LabelUse& use : uses) surfaces[use.name] = std::move(of_labels.at(use.label));
+  return surfaces;
+}
+
+std::map<std::string, TriangleMesh> SurfacesOfFiles(const AnatomyImport& import, const LabelUses& read, const Say& say) {
+  std::map<std::string, TriangleMesh> surfaces;
+  for (const LabelUse& use : read.uses) {
+    TriangleMesh mesh = SurfaceOf(ReadMesh(import.labels / use.file));
+    for (Vec3d& p : mesh.vertices) p = read.W_from_file * p;
+    say(Text("%s: %zu triangles", use.file.c_str(), mesh.triangles.size()));
+    surfaces[use.name] = std::move(mesh);
+  }
+  return surfaces;
 }
 
 const LabelUse& OrganOf(const std::vector<LabelUse>& uses) {
@@ -109,16 +157,19 @@ const LabelUse& OrganOf(const std::vector<LabelUse>& uses) {
 
 }  // namespace
 
-std::vector<LabelUse> ReadLabelUses(const fs::path& file) {
+LabelUses ReadLabelUses(const fs::path& file) {
   StrictYaml yaml = StrictYaml::FromFile(file);
   StrictMap root = yaml.root();
-  std::vector<LabelUse> uses;
-  std::set<std::string> names;
-  std::set<int> numbers;
+  LabelUses result;
+  std::set<std::string> names, sources;
   int organs = 0;
   for (StrictMap& entry : root.Maps("labels", 1, kMostLabels)) {
     LabelUse use;
-    use.label = static_cast<int>(entry.Integer("label", 1, 65535));
+    if (entry.Has("file")) {
+      use.file = entry.Text("file");
+    } else {
+      use.label = static_cast<int>(entry.Integer("label", 1, 65535));
+    }
     use.name = entry.Text("name", 31);
     const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_'; };
     if (!std::all_of(use.name.begin(), use.name.end(), is_plain)) {
@@ -136,28 +187,69 @@ std::vector<LabelUse> ReadLabelUses(const fs::path& file) {
     use.collides = entry.Flag("collides", use.collides);
     use.triangles_max = static_cast<int>(entry.Integer("triangles_max", use.triangles_max, 100, 100000));
     if (!names.insert(use.name).second) entry.Fail("name", "is there twice");
-    if (!numbers.insert(use.label).second) entry.Fail("label", "is there twice");
-    uses.push_back(use);
+    if (!sources.insert(use.file + "/" + std::to_string(use.label)).second) {
+      entry.Fail(use.label > 0 ? "label" : "file", "is there twice");
+    }
+    if ((use.label > 0) != (result.uses.empty() ? use.label > 0 : result.uses[0].label > 0)) {
+      root.Fail("labels", "must all have `label`, or all `file`");
+    }
+    result.uses.push_back(use);
   }
   if (organs == 0) root.Fail("labels", "one entry must have `organ: true`");
+  if (result.uses[0].label == 0) {
+    // To left, cranial, anterior.
+    Mat3d from_ras, from_lps;
+    from_ras << -1, 0, 0, 0, 0, 1, 0, 1, 0;
+    from_lps << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+    const bool is_ras = root.Choice<bool>("axes", {{"RAS", true}, {"LPS", false}});
+    result.W_from_file = 1e3 * LengthUnit(root.TextOr("unit", "mm", 2)) * (is_ras ? from_ras : from_lps);
+  }
   yaml.Finish();
-  return uses;
+  return result;
 }
 
-std::string SuggestLabelUses(const LabelMap& map) {
-  const std::map<int, std::size_t> counts = CountLabels(map);
-  if (counts.empty()) return "";
-  const int largest =
-      std::max_element(counts.begin(), counts.end(), [](const auto& a, const auto& b) { return a.second < b.second; })->first;
-  const double voxel_ml = 1e-3 * std::abs(map.W_from_index.linear().determinant());
-  std::string text = "# What becomes of each label: one deformable organ, which gets the membrane; the others stay fixed. "
-                     "Labels that are left out are ignored.\n# role: abdominal_wall, retroperitoneum, pelvis, bladder or "
-                     "other, which decides the colour.\nlabels:\n";
-  int listed = 0;
-  for (const auto& [label, count] : counts) {
-    if (++listed > kMostLabels) break;
-    text += Text("  - {label: %d, name: label%d%s}   # %.1f ml\n", label, label,
-                 label == largest ? ", organ: true" : ", role: other", static_cast<double>(count) * voxel_ml);
+std::string SuggestLabelUses(const fs::path& labels) {
+  struct Entry {
+    std::string source, name;
+    double size;
+    const char* unit;
+  };
+  std::vector<Entry> entries;
+  const bool is_folder = fs::is_directory(labels);
+  if (is_folder) {
+    for (const auto& entry : fs::directory_iterator(labels)) {
+      std::string extension = entry.path().extension().string();
+      for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+      if (!entry.is_regular_file() || !std::set<std::string>{".stl", ".obj", ".off", ".ply", ".vtk", ".vtp"}.contains(extension)) continue;
+      std::string name = entry.path().stem().string().substr(0, 31);
+      for (char& c : name) c = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' ? c : '_';
+      entries.push_back({"file: \"" + entry.path().filename().string() + "\"", name,
+                         static_cast<double>(ReadMesh(entry.path()).triangles.size()), "triangles"});
+    }
+    std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.source < b.source; });
+  } else {
+    const LabelMap map = ReadLabelMap(labels);
+    const double voxel_ml = 1e-3 * std::abs(map.W_from_index.linear().determinant());
+    for (const auto& [label, count] : CountLabels(map)) {
+      const std::string number = std::to_string(label);
+      entries.push_back({"label: " + number, "label" + number, static_cast<double>(count) * voxel_ml, "ml"});
+    }
+  }
+  if (entries.empty()) {
+    throw InputError(labels.string() + (is_folder ? ": holds no surface (.stl, .obj, .off, .ply, .vtk, .vtp)"
+                                                  : ": every voxel is 0, so nothing is labelled"));
+  }
+  if (entries.size() > kMostLabels) entries.resize(kMostLabels);
+  const auto largest =
+      std::max_element(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.size < b.size; });
+  std::string text = "# What becomes of each: one deformable organ, which gets the membrane; the others stay fixed. What is "
+                     "left out is ignored.\n# role: abdominal_wall, retroperitoneum, pelvis, bladder or other, which "
+                     "decides the colour.\n";
+  if (is_folder) text += "axes: LPS   # of the files: LPS (3D Slicer, most others) or RAS\nunit: mm\n";
+  text += "labels:\n";
+  for (const Entry& entry : entries) {
+    text += "  - {" + entry.source + ", name: " + entry.name + (&entry == &*largest ? ", organ: true" : ", role: other") +
+            Text("}   # %.6g %s\n", entry.size, entry.unit);
   }
   return text;
 }
@@ -166,22 +258,13 @@ std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const P
   const auto say = [&](const std::string& text) {
     if (progress) progress(text);
   };
-  const std::vector<LabelUse> uses = ReadLabelUses(import.map);
-  const LabelMap map = ReadLabelMap(import.labels);
-  say(Text("%d x %d x %d voxels", map.size[0], map.size[1], map.size[2]));
-  const std::map<int, std::size_t> counts = CountLabels(map);
-  std::vector<int> wanted;
-  for (const LabelUse& use : uses) {
-    const auto count = counts.find(use.label);
-    if (count == counts.end() || count->second < kLeastVoxels) {
-      throw InputError(import.map.string() + ": label " + std::to_string(use.label) + " (" + use.name + ") has " +
-                       std::to_string(count == counts.end() ? 0 : count->second) + " voxels in " +
-                       import.labels.string() + "; valid: at least " + std::to_string(kLeastVoxels));
-    }
-    wanted.push_back(use.label);
-  }
-  std::map<int, TriangleMesh> surfaces = SurfacesOf(map, wanted);
-  say("surfaces found");
+  const LabelUses read = ReadLabelUses(import.map);
+  const std::vector<LabelUse>& uses = read.uses;
+  const bool has_voxels = uses[0].label > 0;
+  LabelMap map;
+  std::map<int, std::size_t> counts;
+  std::map<std::string, TriangleMesh> surfaces = has_voxels ? SurfacesOfLabels(import, uses, say, &map, &counts)
+                                                            : SurfacesOfFiles(import, read, say);
   std::error_code error;
   fs::create_directories(import.out, error);
   if (error) throw InputError(import.out.string() + ": cannot be made (" + error.message() + ")");
@@ -192,16 +275,15 @@ std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const P
   scene.name = import.name;
   scene.unit = "mm";
   for (const LabelUse& use : uses) {
-    TriangleMesh& surface = surfaces.at(use.label);
-    LabelReport report{use, counts.at(use.label), 0, PiecesOf(surface), 0, 0};
+    TriangleMesh& surface = surfaces.at(use.name);
+    LabelReport report{use, has_voxels ? counts.at(use.label) : 0, 0, PiecesOf(surface), 0, 0};
     report.voxel_volume_ml = static_cast<double>(report.voxels) * voxel_ml;
     report.volume_ml = 1e-3 * VolumeOf(surface);
     surface = Decimate(surface, use.is_organ ? kOrganTriangles : use.triangles_max);
     report.triangles = surface.triangles.size();
     const std::string file = use.name + ".ply";
     WriteText(import.out / file, Ply(surface));
-    say(Text("%s: %zu voxels, %.1f ml, %d pieces, %zu triangles", file.c_str(), report.voxels, report.volume_ml,
-             report.pieces, report.triangles));
+    say(Text("%s: %.1f ml, %d pieces, %zu triangles", file.c_str(), report.volume_ml, report.pieces, report.triangles));
     if (!use.is_organ) {
       scene.surroundings.push_back(
           {use.name, use.role, import.out / file, Vec3f::Zero(), use.triangles_max, use.collides});

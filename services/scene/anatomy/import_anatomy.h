@@ -1,4 +1,4 @@
-// From a patient's segmentation to a scene: a mesh per label, the description of a scene around the organ, a report.
+// From a patient's segmentation to a scene: a mesh per organ, the description of a scene around one of them, a report.
 #pragma once
 
 #include <filesystem>
@@ -11,9 +11,10 @@
 
 namespace fulcrum::scene {
 
-/// What becomes of a label.
+/// What becomes of a label of a map, or of a file of a folder of surfaces.
 struct LabelUse {
-  int label = 0;
+  int label = 0;     ///< 0: `file` instead.
+  std::string file;
   std::string name;
   bool is_organ = false;  ///< Deformable, under the membrane: one of all. The others are fixed surroundings.
   SurfaceRole role = SurfaceRole::kOther;
@@ -21,11 +22,17 @@ struct LabelUse {
   int triangles_max = 4000;
 };
 
-/// Reads the uses of labels (YAML; keys: services/scene/README.md). Throws InputError "file:line: ...".
-std::vector<LabelUse> ReadLabelUses(const std::filesystem::path& file);
+struct LabelUses {
+  std::vector<LabelUse> uses;
+  /// Of surfaces from files: from their axes and unit to those of frame W in millimetres.
+  Mat3d W_from_file = Mat3d::Identity();
+};
 
-/// A file of uses to be edited: every label of the map, the largest as organ.
-std::string SuggestLabelUses(const LabelMap& map);
+/// Reads the uses of labels or files (YAML; keys: services/scene/README.md). Throws InputError "file:line: ...".
+LabelUses ReadLabelUses(const std::filesystem::path& file);
+
+/// A file of uses to be edited: every label of a map, or every mesh of a folder; the largest as organ. Throws InputError.
+std::string SuggestLabelUses(const std::filesystem::path& labels);
 
 struct LabelReport {
   LabelUse use;
@@ -36,7 +43,8 @@ struct LabelReport {
 
 struct AnatomyImport {
   std::string name;                  ///< Of the scene.
-  std::filesystem::path labels, map;
+  std::filesystem::path labels;      ///< A NIfTI file, or a folder of surfaces.
+  std::filesystem::path map;
   std::filesystem::path out;         ///< Folder to be made.
 };
 

@@ -216,7 +216,7 @@ TEST_F(Segmentation, ASegmentationBecomesAScene) {
     return (p - Vec3d(0, 10, 32)).norm() < 15 ? 9 : 0;
   });
   const fs::path file = Write("labels.nii.gz", fulcrum::testing::NiftiBytes(map, fulcrum::testing::NiftiHeader(map, ras, false)));
-  EXPECT_NE(SuggestLabelUses(map).find("{label: 3, name: label3, organ: true}"), std::string::npos);
+  EXPECT_NE(SuggestLabelUses(file).find("{label: 3, name: label3, organ: true}"), std::string::npos);
   std::ofstream(folder_ / "labels.yaml")
       << "labels:\n  - {label: 3, name: rectum, organ: true}\n  - {label: 9, name: bladder, role: bladder}\n";
   const auto reports = ImportAnatomyFiles({"patient", file, folder_ / "labels.yaml", folder_ / "patient"}, {});
@@ -237,6 +237,40 @@ TEST_F(Segmentation, ASegmentationBecomesAScene) {
               (void)ImportAnatomyFiles({"patient", file, folder_ / "labels.yaml", folder_ / "patient"}, {});
             }).find("label 4 (rectum) has 0 voxels"),
             std::string::npos);
+}
+
+TEST_F(Segmentation, AFolderOfSurfacesBecomesAScene) {
+  const auto label = [](const Vec3d& p) {
+    if (std::hypot(p.x(), p.z()) < 15 && std::abs(p.y()) < 50) return 1;
+    return (p - Vec3d(30, 10, 0)).norm() < 12 ? 2 : 0;  // To the left.
+  };
+  Eigen::Affine3d W = Eigen::Affine3d::Identity();
+  W.linear() *= 2;
+  W.translation().setConstant(-64);
+  const auto surfaces = SurfacesOf(Fill({64, 64, 64}, W, label), {1, 2});
+  fs::create_directories(folder_ / "surfaces");
+  for (const auto& [number, mesh] : surfaces) {
+    std::ofstream obj(folder_ / "surfaces" / (number == 1 ? "Rectum 1.obj" : "ball.obj"));
+    // Left, posterior, superior, in metres.
+    for (const Vec3d& p : mesh.vertices) obj << "v " << 1e-3 * p.x() << " " << -1e-3 * p.z() << " " << 1e-3 * p.y() << "\n";
+    for (const Triangle& t : mesh.triangles) obj << "f " << t[0] + 1 << " " << t[1] + 1 << " " << t[2] + 1 << "\n";
+  }
+  const std::string suggested = SuggestLabelUses(folder_ / "surfaces");
+  EXPECT_NE(suggested.find("{file: \"Rectum 1.obj\", name: Rectum_1, organ: true}"), std::string::npos) << suggested;
+  std::ofstream(folder_ / "labels.yaml") << suggested;
+  const fs::path out = folder_ / "patient";
+  const AnatomyImport import{"patient", folder_ / "surfaces", folder_ / "labels.yaml", out};
+  EXPECT_NE(Refusal([&] { (void)ImportAnatomyFiles(import, {}); }).find("with `unit: m`"), std::string::npos);
+  std::string metres = suggested;
+  metres.replace(metres.find("unit: mm"), 8, "unit: m ");
+  std::ofstream(folder_ / "labels.yaml") << metres;
+  const auto reports = ImportAnatomyFiles(import, {});
+  ASSERT_EQ(reports.size(), 2u);
+  const MeshFile ball = ReadMesh(out / "ball.ply");
+  Vec3d middle = Vec3d::Zero();
+  for (const Vec3d& p : ball.vertices) middle += p / static_cast<double>(ball.vertices.size());
+  EXPECT_LT((middle - Vec3d(30, 10, 0)).norm(), 1) << "left stays left";
+  EXPECT_TRUE(fs::exists(out / "report.html"));
 }
 
 }  // namespace
