@@ -13,7 +13,7 @@ ExitCode ImportAnatomy(const Words& words) {
       "Makes a scene of a patient's segmentation. LABELS is a NIfTI label map, or a folder with a surface per organ.\n"
       "DIR then holds a mesh per organ, the scene with membrane, tools and script around one of them, its picture,\n"
       "and report.html. Left stays left: the position in the patient comes from the NIfTI file (sform, qform), for\n"
-      "surfaces from the map (axes: LPS or RAS).\n\n"
+      "surfaces from the map (axes: LPS, RAS, ...).\n\n"
       "Example:\n"
       "  fulcrum import-anatomy pelvis.nii.gz > labels.yaml     then give the labels their names and roles\n"
       "  fulcrum import-anatomy pelvis.nii.gz --map labels.yaml --out pelvis && fulcrum up pelvis/pelvis.yaml\n";

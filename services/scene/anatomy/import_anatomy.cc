@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <set>
 
 #include "services/base/config/strict_yaml.h"
@@ -114,6 +115,18 @@ std::string Page(const AnatomyImport& import, const LabelMap& map, const std::ve
          ".png\" width=1280></p>";
 }
 
+/// From axes named by their directions in the patient to left, cranial, anterior; none: no such frame.
+std::optional<Mat3d> FromAxes(std::string_view axes) {
+  constexpr std::string_view kDirections = "LRSIAP";
+  Mat3d m = Mat3d::Zero();
+  for (std::size_t a = 0; a < axes.size() && a < 3; ++a) {
+    const std::size_t at = kDirections.find(axes[a]);
+    if (at == std::string_view::npos) return std::nullopt;
+    m(static_cast<Eigen::Index>(at / 2), static_cast<Eigen::Index>(a)) = at % 2 == 0 ? 1 : -1;
+  }
+  return m.determinant() == 1 ? std::optional(m) : std::nullopt;
+}
+
 using Say = std::function<void(const std::string&)>;
 
 /// By the uses' names.
@@ -197,12 +210,13 @@ LabelUses ReadLabelUses(const fs::path& file) {
   }
   if (organs == 0) root.Fail("labels", "one entry must have `organ: true`");
   if (result.uses[0].label == 0) {
-    // To left, cranial, anterior.
-    Mat3d from_ras, from_lps;
-    from_ras << -1, 0, 0, 0, 0, 1, 0, 1, 0;
-    from_lps << 1, 0, 0, 0, 0, 1, 0, -1, 0;
-    const bool is_ras = root.Choice<bool>("axes", {{"RAS", true}, {"LPS", false}});
-    result.W_from_file = 1e3 * LengthUnit(root.TextOr("unit", "mm", 2)) * (is_ras ? from_ras : from_lps);
+    const std::string axes = root.Text("axes", 3);
+    const std::optional<Mat3d> W_from_axes = FromAxes(axes);
+    if (!W_from_axes) {
+      root.Fail("axes", "'" + axes + "' must be the directions of x, y and z in the patient, as in LPS, RAS or LSA: L or R, "
+                        "A or P, S or I, which together do not mirror");
+    }
+    result.W_from_file = 1e3 * LengthUnit(root.TextOr("unit", "mm", 2)) * *W_from_axes;
   }
   yaml.Finish();
   return result;
@@ -245,7 +259,8 @@ std::string SuggestLabelUses(const fs::path& labels) {
   std::string text = "# What becomes of each: one deformable organ, which gets the membrane; the others stay fixed. What is "
                      "left out is ignored.\n# role: abdominal_wall, retroperitoneum, pelvis, bladder or other, which "
                      "decides the colour.\n";
-  if (is_folder) text += "axes: LPS   # of the files: LPS (3D Slicer, most others) or RAS\nunit: mm\n";
+  if (is_folder) text += "axes: LPS   # where x, y and z of the files lead in the patient: LPS (3D Slicer, most others), RAS, LSA ...\n"
+                        "unit: mm\n";
   text += "labels:\n";
   for (const Entry& entry : entries) {
     text += "  - {" + entry.source + ", name: " + entry.name + (&entry == &*largest ? ", organ: true" : ", role: other") +

@@ -124,6 +124,24 @@ double ScopeDistance(const SheetSize& size) {
   return std::clamp(1.2 * std::max(size.width, 0.5 * size.length), 0.06, 0.14);
 }
 
+/// Share of the membrane that other organs touch.
+double CrowdedPart(const Anatomy& anatomy) {
+  constexpr double kTouch_m = 0.004;
+  constexpr std::size_t kStep = 13;
+  std::size_t nodes = 0, crowded = 0;
+  for (std::size_t i = 0; i < anatomy.sheet.size(); i += kStep, ++nodes) {
+    for (const Anatomy::Surrounding& s : anatomy.surroundings) {
+      const bool touches = std::any_of(s.vertices.begin(), s.vertices.end(),
+                                       [&](const Vec3d& p) { return (p - anatomy.sheet[i]).norm() < kTouch_m; });
+      if (touches && s.role != SurfaceRole::kRetroperitoneum) {
+        ++crowded;
+        break;
+      }
+    }
+  }
+  return static_cast<double>(crowded) / static_cast<double>(nodes);
+}
+
 /// Where something stands before the membrane, tries the organ's other sides and takes the first that can be seen, else
 /// the best of them.
 template <class Take>
@@ -132,11 +150,13 @@ void ChooseSide(NewScene* scene, ImportSettings* import, const Take& take, Anato
   const auto room = [&](const Anatomy& at) {
     const std::vector<Vec3d> obstacles = ObstaclesOf(at);
     const Vec3d scope = Trocar(kDistance_m * kScopeDirection, Vec3d::Zero(), kScopeRoom_m, obstacles);
-    return Clearance(obstacles, scope, Vec3d::Zero(), kScopeRoom_m);
+    return Clearance(obstacles, scope, Vec3d::Zero(), kScopeRoom_m) * (1 - CrowdedPart(at));
   };
   double most = room(*anatomy);
-  for (const Vec3d& side : {Vec3d(0, 0, 1), Vec3d(1, 0, 1), Vec3d(-1, 0, 1), Vec3d(1, 0, 0), Vec3d(-1, 0, 0), Vec3d(0, 0, -1)}) {
-    if (most >= kScopeRoom_m) return;
+  const Vec3d behind(0, 0, -1);
+  for (const Vec3d& side : {Vec3d(0, 0, 1), Vec3d(1, 0, 1), Vec3d(-1, 0, 1), Vec3d(1, 0, 0), Vec3d(-1, 0, 0), behind}) {
+    // No surgeon comes from behind if there is any other way.
+    if (most >= kScopeRoom_m || (side == behind && most > kShaftRoom_m)) return;
     const std::optional<Vec3f> before = import->facing;
     import->facing = side.cast<float>();
     try {

@@ -1,53 +1,21 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 
 #include "services/scene/compiler/drape.h"
+#include "services/scene/compiler/height_map.h"
 #include "services/scene/compiler/sheet_grid.h"
 #include "services/scene/compiler/spot.h"
 
 namespace fulcrum::scene {
 namespace {
 
-constexpr int kHeights = 129;           ///< Samples of the organ's height either way.
 constexpr double kSteepest = 1.2;       ///< Slope of the sheet beside something that protrudes: 50 degrees.
 constexpr double kLeastCovered = 0.5;   ///< Share of the rectangle below which there must be organ.
 constexpr int kHeightSmoothing = 6, kPatchSmoothing = 20, kPatchRounds = 4;
 /// The gap decreases over this share of the patch, or this many gaps if that is more, to …
 constexpr double kRimTaper = 0.15, kGapsOfTaper = 3.5;
 constexpr double kRimGap = 0.12;        ///< … this share of it at the rim.
-constexpr double kNone = -std::numeric_limits<double>::infinity();
-
-/// Height of the organ above each point of a rectangle around the origin, kNone beside it: a depth buffer seen along -z.
-Grid<double> Heights(const TriangleMesh& organ, double width, double length) {
-  Grid<double> heights(kHeights, kHeights, kNone);
-  const auto column = [&](double x) { return (x / width + 0.5) * (kHeights - 1); };
-  const auto row = [&](double y) { return (y / length + 0.5) * (kHeights - 1); };
-  for (const Triangle& t : organ.triangles) {
-    const Vec3d &a = organ.vertices[t[0]], &b = organ.vertices[t[1]], &c = organ.vertices[t[2]];
-    const double area = (b.x() - a.x()) * (c.y() - a.y()) - (c.x() - a.x()) * (b.y() - a.y());
-    if (!(area > 0)) continue;  // Seen from inside or on edge.
-    const auto [x0, x1] = std::minmax({column(a.x()), column(b.x()), column(c.x())});
-    const auto [y0, y1] = std::minmax({row(a.y()), row(b.y()), row(c.y())});
-    const int c0 = std::max(0, static_cast<int>(std::ceil(std::max(x0, -1.0)))),
-              c1 = std::min(kHeights - 1, static_cast<int>(std::floor(std::min<double>(x1, kHeights))));
-    const int r0 = std::max(0, static_cast<int>(std::ceil(std::max(y0, -1.0)))),
-              r1 = std::min(kHeights - 1, static_cast<int>(std::floor(std::min<double>(y1, kHeights))));
-    for (int r = r0; r <= r1; ++r) {
-      for (int k = c0; k <= c1; ++k) {
-        const double x = (static_cast<double>(k) / (kHeights - 1) - 0.5) * width,
-                     y = (static_cast<double>(r) / (kHeights - 1) - 0.5) * length;
-        const double v = ((x - a.x()) * (c.y() - a.y()) - (c.x() - a.x()) * (y - a.y())) / area,
-                     w = ((b.x() - a.x()) * (y - a.y()) - (x - a.x()) * (b.y() - a.y())) / area;
-        if (v >= 0 && w >= 0 && v + w <= 1) {
-          heights.at(r, k) = std::max(heights.at(r, k), a.z() + v * (b.z() - a.z()) + w * (c.z() - a.z()));
-        }
-      }
-    }
-  }
-  return heights;
-}
 
 /// The lowest surface above `heights` that is nowhere steeper than kSteepest: the envelope of cones under every sample.
 /// Two passes over the eight neighbours (a chamfer transform).
@@ -97,16 +65,16 @@ Vec3d Up(int /*row*/) { return Vec3d::UnitZ(); }
 
 std::vector<Vec3d> DrapePatch(double width, double length, const MembraneSettings& membrane, const TriangleMesh& organ,
                               const std::string& name) {
-  Grid<double> heights = Heights(organ, width, length);
-  const auto covered = std::count_if(heights.values.begin(), heights.values.end(), [](double h) { return h > kNone; });
+  Grid<double> heights = HeightsOf(organ, width, length);
+  const auto covered = std::count_if(heights.values.begin(), heights.values.end(), [](double h) { return h > kNoHeight; });
   if (static_cast<double>(covered) < kLeastCovered * static_cast<double>(heights.values.size())) {
-    throw SpotError(name + ": below " + std::to_string(100 - 100 * covered / (kHeights * kHeights)) +
+    throw SpotError(name + ": below " + std::to_string(100 - 100 * covered / (kHeightSamples * kHeightSamples)) +
                      " % of the membrane's patch there is no organ; valid: at most " +
                      std::to_string(static_cast<int>(100 - 100 * kLeastCovered)) +
                      " %. Choose another `at_mm` or `facing`, or a smaller `width_mm` and `length_mm`",
                     {{organ}, Vec3d::Zero()});
   }
-  LimitSlope(width / (kHeights - 1), length / (kHeights - 1), &heights);
+  LimitSlope(width / (kHeightSamples - 1), length / (kHeightSamples - 1), &heights);
   heights.Smooth(kHeightSmoothing, false);
   const auto taper = [&](double side) {
     return std::min(0.5, std::max(kRimTaper, kGapsOfTaper * membrane.gap_m / side));

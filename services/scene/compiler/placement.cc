@@ -7,6 +7,7 @@
 #include <queue>
 
 #include "services/scene/builder/geometry.h"
+#include "services/scene/compiler/height_map.h"
 
 namespace fulcrum::scene {
 namespace {
@@ -183,6 +184,76 @@ Vec3d NormalAround(const TriangleMesh& surface, const Vec3d& p, Vec3d* nearest) 
   return sum.norm() > 0 ? Vec3d(sum.normalized()) : own;
 }
 
+/// The organ's outline as seen from above.
+class Silhouette {
+ public:
+  Silhouette(const Grid<double>& heights, double width, double length) : width_(width), length_(length), covered_(heights) {
+    for (double& value : covered_.values) value = value > kNoHeight ? 1 : 0;
+  }
+
+  /// The point of the outline farthest from its border; of several, the nearest to the middle.
+  [[nodiscard]] Vec2d Deepest() const {
+    // Chamfer distances: two passes over the eight neighbours. The border of the grid counts as outside.
+    const double dx = width_ / (kHeightSamples - 1), dy = length_ / (kHeightSamples - 1), diagonal = std::hypot(dx, dy);
+    Grid<double> depth = covered_;
+    const auto at = [&](int r, int c) {
+      return r < 0 || c < 0 || r >= depth.rows || c >= depth.cols ? 0.0 : depth.at(r, c);
+    };
+    for (double& value : depth.values) value *= width_ + length_;
+    for (int r = 0; r < depth.rows; ++r) {
+      for (int c = 0; c < depth.cols; ++c) {
+        depth.at(r, c) = std::min({depth.at(r, c), at(r, c - 1) + dx, at(r - 1, c) + dy, at(r - 1, c - 1) + diagonal,
+                                   at(r - 1, c + 1) + diagonal});
+      }
+    }
+    Vec2d best = Vec2d::Zero();
+    double deepest = -1;
+    for (int r = depth.rows - 1; r >= 0; --r) {
+      for (int c = depth.cols - 1; c >= 0; --c) {
+        depth.at(r, c) = std::min({depth.at(r, c), at(r, c + 1) + dx, at(r + 1, c) + dy, at(r + 1, c + 1) + diagonal,
+                                   at(r + 1, c - 1) + diagonal});
+        const Vec2d place((static_cast<double>(c) / (kHeightSamples - 1) - 0.5) * width_,
+                          (static_cast<double>(r) / (kHeightSamples - 1) - 0.5) * length_);
+        const double value = depth.at(r, c) - kCentring * place.norm();
+        if (value > deepest) {
+          deepest = value;
+          best = place;
+        }
+      }
+    }
+    return best;
+  }
+
+  /// Reduces the sides of a rectangle until the organ is below nearly all of it.
+  void Shrink(const Vec2d& middle, double least, Vec2d* sides) const {
+    constexpr double kCovered = 0.93, kStep = 0.95;
+    while (Covered(middle, *sides) < kCovered && sides->minCoeff() > least) {
+      const Vec2d narrower(kStep * sides->x(), sides->y()), shorter(sides->x(), kStep * sides->y());
+      *sides = Covered(middle, narrower) >= Covered(middle, shorter) ? narrower : shorter;
+    }
+  }
+
+ private:
+  static constexpr double kCentring = 0.15;  ///< Depth that is given up for being so much nearer to the middle.
+
+  [[nodiscard]] double Covered(const Vec2d& middle, const Vec2d& sides) const {
+    constexpr int kSamples = 24;
+    double sum = 0;
+    for (int i = 0; i <= kSamples; ++i) {
+      for (int k = 0; k <= kSamples; ++k) {
+        const Vec2d p = middle + Vec2d(sides.x() * (static_cast<double>(i) / kSamples - 0.5),
+                                       sides.y() * (static_cast<double>(k) / kSamples - 0.5));
+        const double row = p.y() / length_ + 0.5, col = p.x() / width_ + 0.5;
+        if (row >= 0 && row <= 1 && col >= 0 && col <= 1) sum += covered_.Sample(row, col);
+      }
+    }
+    return sum / ((kSamples + 1) * (kSamples + 1));
+  }
+
+  double width_, length_;
+  Grid<double> covered_;
+};
+
 /// Rows are the axes x, y, z of W, with z along `up` and y as near to `along` as possible.
 Mat3d FrameOf(const Vec3d& up, const Vec3d& along) {
   const Vec3d z = up.normalized();
@@ -257,9 +328,8 @@ Placement PlacePatch(const TriangleMesh& surface, const ImportSettings& import) 
   Placement placement;
   Vec3d up = WithPositiveSense(axes.eigenvectors().col(0));
   placement.origin_m = moments.centroid;
-  if (import.patch_at_m) {
-    up = NormalAround(surface, import.patch_at_m->cast<double>(), &placement.origin_m);
-  }
+  Vec3d at = moments.centroid;
+  if (import.patch_at_m) up = NormalAround(surface, import.patch_at_m->cast<double>(), &at);
   if (import.facing) up = import.facing->cast<double>();
   placement.R_WF = FrameOf(up, WithPositiveSense(axes.eigenvectors().col(2)));
   Vec3d low = Vec3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
@@ -267,15 +337,21 @@ Placement PlacePatch(const TriangleMesh& surface, const ImportSettings& import) 
     low = low.cwiseMin(placement.ToWorld(p));
     high = high.cwiseMax(placement.ToWorld(p));
   }
-  if (!import.patch_at_m) {
-    const Vec3d middle(0.5 * (low.x() + high.x()), 0.5 * (low.y() + high.y()), 0);
-    placement.origin_m += placement.R_WF.transpose() * middle;
-  }
-  const auto size = [](double wanted, double extent) {
-    return wanted > 0 ? wanted : std::clamp(kPatchShare * extent, kLeastPatch_m, kLargestPatch_m);
+  const double width = high.x() - low.x(), length = high.y() - low.y();
+  placement.origin_m += placement.R_WF.transpose() * Vec3d(0.5 * (low.x() + high.x()), 0.5 * (low.y() + high.y()), 0);
+  TriangleMesh placed = surface;
+  for (Vec3d& p : placed.vertices) p = placement.ToWorld(p);
+  const Silhouette silhouette(HeightsOf(placed, width, length), width, length);
+  Vec2d middle = silhouette.Deepest();
+  if (import.patch_at_m) middle = placement.ToWorld(at).head<2>();
+  placement.origin_m += placement.R_WF.transpose() * Vec3d(middle.x(), middle.y(), 0);
+  const auto size = [](double share, double extent) {
+    return std::clamp(share * extent, kLeastPatch_m, kLargestPatch_m);
   };
-  placement.patch_width_m = size(import.patch_width_m, high.x() - low.x());
-  placement.patch_length_m = size(import.patch_length_m, high.y() - low.y());
+  Vec2d sides(size(kPatchShare, width), size(kPatchShare, length));
+  silhouette.Shrink(middle, kLeastPatch_m, &sides);
+  placement.patch_width_m = import.patch_width_m > 0 ? import.patch_width_m : sides.x();
+  placement.patch_length_m = import.patch_length_m > 0 ? import.patch_length_m : sides.y();
   return placement;
 }
 

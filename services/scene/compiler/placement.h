@@ -28,8 +28,9 @@ std::vector<Vec3d> FindCentreLine(const TriangleMesh& surface);
 /// z axis, across the line, then the other sides in turn.
 std::vector<Placement> PlacesOfTube(const std::vector<Vec3d>& line, const ImportSettings& import);
 
-/// Placement of any body. The patch lies around `import.patch_at_m`, else in the middle of the body as seen along
-/// `import.facing`; without either it is seen along its shortest principal axis.
+/// Placement of any body, seen along `import.facing`, else along the normal at `import.patch_at_m`, else along its
+/// shortest principal axis. The patch lies around `import.patch_at_m`, else where the body's outline is widest, and is as
+/// large as that permits.
 Placement PlacePatch(const TriangleMesh& surface, const ImportSettings& import);
 
 /// The longest side of the box around points [m].

@@ -10,6 +10,7 @@
 #include "services/base/runtime/child_process.h"
 #include "services/scene/builder/geometry.h"
 #include "services/scene/readers/mesh_io.h"
+#include "services/session/supervisor/scene_cache.h"
 #include "tests/benchmark/import/organ_shapes.h"
 #include "tests/support/nifti_writer.h"
 
@@ -104,6 +105,14 @@ void MeasureAnatomy(Report* report, const fs::path& folder) {
   }
   report->Add("import.anatomy_s", seconds, "s");
   report->Add("import.hausdorff_voxels", seconds < 0 ? -1 : farthest / kVoxel_mm, "voxels");
+
+  if (seconds >= 0) {
+    const supervisor::SceneRequest request{(out / "pelvis.yaml").string(), {}, {}, {}, fs::path(FULCRUM_BIN_DIR) / "scene_compiler",
+                                           folder / "cache"};
+    const auto compile_s = [&] { return TimeMs(0, 1, [&] { (void)supervisor::ResolveScene(request); }).front() / 1e3; };
+    report->Add("import.compile_s.pelvis", compile_s(), "s");
+    report->Add("import.compile_s.unchanged", compile_s(), "s");
+  }
 
   // Coarse, by its parts' places: each storage must give the same patient.
   int errors = 0;

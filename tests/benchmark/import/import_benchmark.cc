@@ -161,7 +161,8 @@ int main(int argc, char** argv) {
   if (!report.Wants("import.")) return 0;
   const fs::path folder = fs::temp_directory_path() / ("fulcrum_import_" + std::to_string(getpid()));
   fs::create_directories(folder);
-  if (report.Wants("import.anatomy") || report.Wants("import.hausdorff") || report.Wants("import.orientation")) {
+  if (report.Wants("import.anatomy") || report.Wants("import.hausdorff") || report.Wants("import.orientation") ||
+      report.Wants("import.compile_s")) {
     MeasureAnatomy(&report, folder);
   }
   if (report.Wants("import.meshes") || report.Wants("import.organ")) Run(&report, folder);

@@ -207,6 +207,14 @@ TEST_F(Segmentation, UsesOfLabelsAreChecked) {
   EXPECT_NE(refusal("labels:\n  - {label: 1, name: ../a, organ: true}\n").find("it names a file"), std::string::npos);
   EXPECT_NE(refusal("labels:\n  - {label: 1, name: a, organ: true}\n  - {label: 1, name: b}\n").find("is there twice"),
             std::string::npos);
+  EXPECT_NE(refusal("labels:\n  - {label: 1, name: a, organ: true}\n  - {file: b.stl, name: b}\n").find("or all `file`"),
+            std::string::npos);
+  const std::string files = "labels:\n  - {file: a.stl, name: a, organ: true}\n";
+  EXPECT_NE(refusal(files).find("axes"), std::string::npos) << "no default: a wrong guess would mirror";
+  for (const char* axes : {"LAS", "LLS", "XYZ", "LP"}) {
+    EXPECT_NE(refusal("axes: " + std::string(axes) + "\n" + files).find("do not mirror"), std::string::npos) << axes;
+  }
+  for (const char* axes : {"LPS", "RAS", "LSA", "PIR"}) EXPECT_EQ(refusal("axes: " + std::string(axes) + "\n" + files), "");
 }
 
 TEST_F(Segmentation, ASegmentationBecomesAScene) {

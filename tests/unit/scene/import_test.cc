@@ -97,14 +97,38 @@ TEST(CentreLineOfATube, FollowsItsBends) {
 
 TEST(CentreLineOfATube, ABallHasNone) { EXPECT_TRUE(FindCentreLine(Ball({0, 0, 0}, 0.03)).empty()); }
 
+TEST(Patch, LiesOnTheWidestPartAndNotBesideTheOrgan) {
+  // A ball with a long, thin handle.
+  std::vector<Vec3d> line;
+  std::vector<double> radii;
+  for (int i = 1; i < 24; ++i) {
+    const double a = M_PI * i / 24;
+    line.emplace_back(0, -0.03 * std::cos(a), 0);
+    radii.push_back(std::max(0.03 * std::sin(a), i > 12 ? 0.004 : 0.0));
+  }
+  line.emplace_back(0, 0.09, 0);
+  radii.push_back(0.004);
+  ImportSettings import;
+  import.facing = Vec3f::UnitZ();
+  const TriangleMesh organ = Rings(line, radii);
+  const Placement place = PlacePatch(organ, import);
+  EXPECT_LT(place.ToWorld(Vec3d::Zero()).head<2>().norm(), 0.006) << "on the ball";
+  EXPECT_LT(place.patch_length_m, 0.058);
+  EXPECT_GT(place.patch_length_m, 0.025);
+}
+
 TEST(Patch, LiesWhereItIsAsked) {
   const Vec3d centre(0.3, -0.2, 0.1);
   ImportSettings import;
   import.patch_at_m = (centre + Vec3d(0, 0, 0.05)).cast<float>();
   const Placement top = PlacePatch(Ball(centre, 0.03), import);
   EXPECT_LT((top.R_WF.row(2).transpose() - Vec3d::UnitZ()).norm(), 0.05) << "z of W is the normal there";
-  EXPECT_NEAR(top.ToWorld(centre + Vec3d(0, 0, 0.03)).norm(), 0, 0.001);
+  EXPECT_NEAR(top.ToWorld(centre + Vec3d(0, 0, 0.03)).head<2>().norm(), 0, 0.001);
   EXPECT_NEAR(top.R_WF.determinant(), 1, 1e-9);
+  // Off the pole it stays beside it.
+  import.facing = Vec3f::UnitZ();
+  import.patch_at_m = (centre + Vec3d(0.01, -0.005, 0.05)).cast<float>();
+  EXPECT_LT(PlacePatch(Ball(centre, 0.03), import).ToWorld(centre + Vec3d(0.006, -0.003, 0.03)).head<2>().norm(), 0.002);
   import.patch_at_m.reset();
   import.facing = Vec3f(-1, 0, 0);
   const Placement side = PlacePatch(Ball(centre, 0.03), import);
