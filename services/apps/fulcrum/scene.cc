@@ -42,9 +42,11 @@ void Explain(const std::string& text) {
   std::vector<config::KeyRule> found;
   // Keys of lists are known where a scene has them.
   for (const char* scene : {"openhelp", "built-in", "dissection", "assisted"}) {
-    for (const config::KeyRule& rule : scene::SceneRules(runtime::ShareFolder() / "scenes" / (std::string(scene) + ".yaml"))) {
+    for (const config::KeyRule& rule :
+         scene::SceneRules(runtime::ShareFolder() / "scenes" / (std::string(scene) + ".yaml"))) {
       const auto is_same = [&](const config::KeyRule& other) { return other.path == rule.path; };
-      if (rule.path.find(text) != std::string::npos && !rule.valid.empty() && std::none_of(found.begin(), found.end(), is_same)) {
+      if (rule.path.find(text) != std::string::npos && !rule.valid.empty() &&
+          std::none_of(found.begin(), found.end(), is_same)) {
         found.push_back(rule);
       }
     }
@@ -55,7 +57,10 @@ void Explain(const std::string& text) {
   }
   for (const config::KeyRule& rule : found) {
     std::printf("%-44s %s%s; valid: %s\n", rule.path.c_str(), rule.standard ? "default " : "must be given",
-                !rule.standard ? "" : rule.standard->empty() ? "none" : rule.standard->c_str(), rule.valid.c_str());
+                !rule.standard           ? ""
+                : rule.standard->empty() ? "none"
+                                         : rule.standard->c_str(),
+                rule.valid.c_str());
   }
 }
 

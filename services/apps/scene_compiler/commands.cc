@@ -133,7 +133,7 @@ void Compile(const Arguments& arguments) {
   }
   const Stages stages(arguments.quiet);
   const Limit limit(arguments.limit_s);
-  fs::path fault = !arguments.out.empty()     ? fs::path(arguments.out)
+  fs::path fault = !arguments.out.empty()       ? fs::path(arguments.out)
                    : !arguments.preview.empty() ? fs::path(arguments.preview)
                                                 : fs::path(arguments.plain[0]).filename();
   fault.replace_extension(".fault.png");
@@ -186,9 +186,9 @@ void MakeNew(const Arguments& arguments) {
     Preview(compiled.data.View(), picture);
     stages.Say("drew " + picture.string());
     if (!arguments.quiet) {
-      std::cout << scene::Describe(compiled.data.View(), scene::Measure(compiled.data.View()))
-                << "\nNext: look at " << picture.string() << ", then\n  fulcrum up " << yaml.string()
-                << "\n  fulcrum up " << yaml.string() << " --window --hands mouse   to operate it yourself\n";
+      std::cout << scene::Describe(compiled.data.View(), scene::Measure(compiled.data.View())) << "\nNext: look at "
+                << picture.string() << ", then\n  fulcrum up " << yaml.string() << "\n  fulcrum up " << yaml.string()
+                << " --window --hands mouse   to operate it yourself\n";
     }
   });
 }

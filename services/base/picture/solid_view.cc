@@ -16,8 +16,16 @@ constexpr int kMargin = 12;
 
 SolidView::SolidView(int x0, int y0, int x1, int y1, const Vec3d& centre, const Vec3d& right, const Vec3d& up,
                      double pixel_m, Canvas* canvas)
-    : x0_(x0), y0_(y0), x1_(x1), y1_(y1), centre_(centre), right_(right), up_(up), eye_(right.cross(up)),
-      pixel_m_(pixel_m), canvas_(canvas),
+    : x0_(x0),
+      y0_(y0),
+      x1_(x1),
+      y1_(y1),
+      centre_(centre),
+      right_(right),
+      up_(up),
+      eye_(right.cross(up)),
+      pixel_m_(pixel_m),
+      canvas_(canvas),
       depth_(static_cast<std::size_t>(x1 - x0) * static_cast<std::size_t>(y1 - y0),
              -std::numeric_limits<double>::infinity()) {}
 
@@ -33,8 +41,7 @@ void SolidView::Solid(std::span<const Vec3d> vertices, std::span<const Triangle>
     // Rows of pixels run downwards, so what faces the eye turns clockwise.
     const double area = (b.x() - a.x()) * (c.y() - a.y()) - (c.x() - a.x()) * (b.y() - a.y());
     if (!(std::abs(area) > 1e-12) || (area > 0 && !both_sides)) continue;
-    const Vec3d normal =
-        (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]).normalized();
+    const Vec3d normal = (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]).normalized();
     const Rgb shaded = Mix({0, 0, 0}, colour, kShade + (1 - kShade) * std::abs(normal.dot(eye_)));
     const auto clamp = [](double value, int low, int high) {
       return static_cast<int>(std::clamp(value, static_cast<double>(low), static_cast<double>(high)));

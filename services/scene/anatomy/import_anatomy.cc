@@ -42,10 +42,11 @@ void WriteText(const fs::path& file, const std::string& text) {
 
 /// Binary little-endian PLY, which keeps shared vertices.
 std::string Ply(const TriangleMesh& mesh) {
-  std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment millimetres; x left, y cranial, z anterior\n"
-                      "element vertex " + std::to_string(mesh.vertices.size()) +
-                      "\nproperty float x\nproperty float y\nproperty float z\nelement face " +
-                      std::to_string(mesh.triangles.size()) + "\nproperty list uchar int vertex_indices\nend_header\n";
+  std::string bytes =
+      "ply\nformat binary_little_endian 1.0\ncomment millimetres; x left, y cranial, z anterior\n"
+      "element vertex " +
+      std::to_string(mesh.vertices.size()) + "\nproperty float x\nproperty float y\nproperty float z\nelement face " +
+      std::to_string(mesh.triangles.size()) + "\nproperty list uchar int vertex_indices\nend_header\n";
   const auto put = [&](const auto& value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof(value)); };
   for (const Vec3d& p : mesh.vertices) {
     for (int k = 0; k < 3; ++k) put(static_cast<float>(p[k]));
@@ -153,7 +154,8 @@ std::map<std::string, TriangleMesh> SurfacesOfLabels(const AnatomyImport& import
   return surfaces;
 }
 
-std::map<std::string, TriangleMesh> SurfacesOfFiles(const AnatomyImport& import, const LabelUses& read, const Say& say) {
+std::map<std::string, TriangleMesh> SurfacesOfFiles(const AnatomyImport& import, const LabelUses& read,
+                                                    const Say& say) {
   std::map<std::string, TriangleMesh> surfaces;
   for (const LabelUse& use : read.uses) {
     TriangleMesh mesh = SurfaceOf(ReadMesh(import.labels / use.file));
@@ -213,8 +215,9 @@ LabelUses ReadLabelUses(const fs::path& file) {
     const std::string axes = root.Text("axes", 3);
     const std::optional<Mat3d> W_from_axes = FromAxes(axes);
     if (!W_from_axes) {
-      root.Fail("axes", "'" + axes + "' must be the directions of x, y and z in the patient, as in LPS, RAS or LSA: L or R, "
-                        "A or P, S or I, which together do not mirror");
+      root.Fail("axes", "'" + axes +
+                            "' must be the directions of x, y and z in the patient, as in LPS, RAS or LSA: L or R, "
+                            "A or P, S or I, which together do not mirror");
     }
     result.W_from_file = 1e3 * LengthUnit(root.TextOr("unit", "mm", 2)) * *W_from_axes;
   }
@@ -234,7 +237,9 @@ std::string SuggestLabelUses(const fs::path& labels) {
     for (const auto& entry : fs::directory_iterator(labels)) {
       std::string extension = entry.path().extension().string();
       for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-      if (!entry.is_regular_file() || !std::set<std::string>{".stl", ".obj", ".off", ".ply", ".vtk", ".vtp"}.contains(extension)) continue;
+      if (!entry.is_regular_file() ||
+          !std::set<std::string>{".stl", ".obj", ".off", ".ply", ".vtk", ".vtp"}.contains(extension))
+        continue;
       std::string name = entry.path().stem().string().substr(0, 31);
       for (char& c : name) c = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' ? c : '_';
       entries.push_back({"file: \"" + entry.path().filename().string() + "\"", name,
@@ -256,15 +261,18 @@ std::string SuggestLabelUses(const fs::path& labels) {
   if (entries.size() > kMostLabels) entries.resize(kMostLabels);
   const auto largest =
       std::max_element(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.size < b.size; });
-  std::string text = "# What becomes of each: one deformable organ, which gets the membrane; the others stay fixed. What is "
-                     "left out is ignored.\n# role: abdominal_wall, retroperitoneum, pelvis, bladder or other, which "
-                     "decides the colour.\n";
-  if (is_folder) text += "axes: LPS   # where x, y and z of the files lead in the patient: LPS (3D Slicer, most others), RAS, LSA ...\n"
-                        "unit: mm\n";
+  std::string text =
+      "# What becomes of each: one deformable organ, which gets the membrane; the others stay fixed. What is "
+      "left out is ignored.\n# role: abdominal_wall, retroperitoneum, pelvis, bladder or other, which "
+      "decides the colour.\n";
+  if (is_folder)
+    text +=
+        "axes: LPS   # where x, y and z of the files lead in the patient: LPS (3D Slicer, most others), RAS, LSA ...\n"
+        "unit: mm\n";
   text += "labels:\n";
   for (const Entry& entry : entries) {
-    text += "  - {" + entry.source + ", name: " + entry.name + (&entry == &*largest ? ", organ: true" : ", role: other") +
-            Text("}   # %.6g %s\n", entry.size, entry.unit);
+    text += "  - {" + entry.source + ", name: " + entry.name +
+            (&entry == &*largest ? ", organ: true" : ", role: other") + Text("}   # %.6g %s\n", entry.size, entry.unit);
   }
   return text;
 }
@@ -278,8 +286,8 @@ std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const P
   const bool has_voxels = uses[0].label > 0;
   LabelMap map;
   std::map<int, std::size_t> counts;
-  std::map<std::string, TriangleMesh> surfaces = has_voxels ? SurfacesOfLabels(import, uses, say, &map, &counts)
-                                                            : SurfacesOfFiles(import, read, say);
+  std::map<std::string, TriangleMesh> surfaces =
+      has_voxels ? SurfacesOfLabels(import, uses, say, &map, &counts) : SurfacesOfFiles(import, read, say);
   std::error_code error;
   fs::create_directories(import.out, error);
   if (error) throw InputError(import.out.string() + ": cannot be made (" + error.message() + ")");

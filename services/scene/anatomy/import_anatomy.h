@@ -13,7 +13,7 @@ namespace fulcrum::scene {
 
 /// What becomes of a label of a map, or of a file of a folder of surfaces.
 struct LabelUse {
-  int label = 0;     ///< 0: `file` instead.
+  int label = 0;  ///< 0: `file` instead.
   std::string file;
   std::string name;
   bool is_organ = false;  ///< Deformable, under the membrane: one of all. The others are fixed surroundings.
@@ -31,21 +31,22 @@ struct LabelUses {
 /// Reads the uses of labels or files (YAML; keys: services/scene/README.md). Throws InputError "file:line: ...".
 LabelUses ReadLabelUses(const std::filesystem::path& file);
 
-/// A file of uses to be edited: every label of a map, or every mesh of a folder; the largest as organ. Throws InputError.
+/// A file of uses to be edited: every label of a map, or every mesh of a folder; the largest as organ. Throws
+/// InputError.
 std::string SuggestLabelUses(const std::filesystem::path& labels);
 
 struct LabelReport {
   LabelUse use;
   std::size_t voxels = 0, triangles = 0;
-  int pieces = 0;                           ///< Separate parts of the surface.
+  int pieces = 0;                             ///< Separate parts of the surface.
   double voxel_volume_ml = 0, volume_ml = 0;  ///< Of the voxels, of the surface.
 };
 
 struct AnatomyImport {
-  std::string name;                  ///< Of the scene.
-  std::filesystem::path labels;      ///< A NIfTI file, or a folder of surfaces.
+  std::string name;              ///< Of the scene.
+  std::filesystem::path labels;  ///< A NIfTI file, or a folder of surfaces.
   std::filesystem::path map;
-  std::filesystem::path out;         ///< Folder to be made.
+  std::filesystem::path out;  ///< Folder to be made.
 };
 
 /// Writes NAME.yaml, a mesh per label (PLY, millimetres, axes of frame W: left, cranial, anterior), report.html and

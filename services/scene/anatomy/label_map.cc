@@ -45,8 +45,9 @@ void Take(const std::filesystem::path& file, const nifti_image& image, double sl
   for (std::size_t i = 0; i < map->labels.size(); ++i) {
     const double value = slope * static_cast<double>(values[i]) + (slope == 1 ? 0 : image.scl_inter);
     if (!(value >= 0 && value <= kMostLabel) || value != std::floor(value)) {
-      Refuse(file, "voxel " + std::to_string(i) + " is " + std::to_string(value) +
-                       "; valid: whole numbers 0 to 65535. This is no label map, or it was resampled with interpolation");
+      Refuse(file,
+             "voxel " + std::to_string(i) + " is " + std::to_string(value) +
+                 "; valid: whole numbers 0 to 65535. This is no label map, or it was resampled with interpolation");
     }
     map->labels[i] = static_cast<std::uint16_t>(value);
   }
@@ -67,7 +68,8 @@ LabelMap ReadLabelMap(const std::filesystem::path& file) {
                        " voxels; valid: 2 to 4096 either way");
     }
   }
-  const auto voxels = static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(size[2]);
+  const auto voxels =
+      static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(size[2]);
   if (voxels > kMostVoxels || static_cast<std::size_t>(image->nvox) != voxels) {
     Refuse(file, "holds " + std::to_string(image->nvox) + " values for " + std::to_string(voxels) +
                      " voxels; valid: one value each, at most " + std::to_string(kMostVoxels));
@@ -91,17 +93,38 @@ LabelMap ReadLabelMap(const std::filesystem::path& file) {
   map.labels.resize(voxels);
   const double slope = image->scl_slope == 0 ? 1 : image->scl_slope;
   switch (image->datatype) {
-    case DT_UINT8: Take<std::uint8_t>(file, *image, slope, &map); break;
-    case DT_INT8: Take<std::int8_t>(file, *image, slope, &map); break;
-    case DT_UINT16: Take<std::uint16_t>(file, *image, slope, &map); break;
-    case DT_INT16: Take<std::int16_t>(file, *image, slope, &map); break;
-    case DT_UINT32: Take<std::uint32_t>(file, *image, slope, &map); break;
-    case DT_INT32: Take<std::int32_t>(file, *image, slope, &map); break;
-    case DT_UINT64: Take<std::uint64_t>(file, *image, slope, &map); break;
-    case DT_INT64: Take<std::int64_t>(file, *image, slope, &map); break;
-    case DT_FLOAT32: Take<float>(file, *image, slope, &map); break;
-    case DT_FLOAT64: Take<double>(file, *image, slope, &map); break;
-    default: Refuse(file, "has values of type " + std::to_string(image->datatype) + "; valid: whole or real numbers");
+    case DT_UINT8:
+      Take<std::uint8_t>(file, *image, slope, &map);
+      break;
+    case DT_INT8:
+      Take<std::int8_t>(file, *image, slope, &map);
+      break;
+    case DT_UINT16:
+      Take<std::uint16_t>(file, *image, slope, &map);
+      break;
+    case DT_INT16:
+      Take<std::int16_t>(file, *image, slope, &map);
+      break;
+    case DT_UINT32:
+      Take<std::uint32_t>(file, *image, slope, &map);
+      break;
+    case DT_INT32:
+      Take<std::int32_t>(file, *image, slope, &map);
+      break;
+    case DT_UINT64:
+      Take<std::uint64_t>(file, *image, slope, &map);
+      break;
+    case DT_INT64:
+      Take<std::int64_t>(file, *image, slope, &map);
+      break;
+    case DT_FLOAT32:
+      Take<float>(file, *image, slope, &map);
+      break;
+    case DT_FLOAT64:
+      Take<double>(file, *image, slope, &map);
+      break;
+    default:
+      Refuse(file, "has values of type " + std::to_string(image->datatype) + "; valid: whole or real numbers");
   }
   return map;
 }

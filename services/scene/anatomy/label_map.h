@@ -16,7 +16,8 @@ namespace fulcrum::scene {
 struct LabelMap {
   std::array<int, 3> size{0, 0, 0};
   std::vector<std::uint16_t> labels;
-  /// To the axes of frame W in millimetres: x to the patient's left, y cranial, z anterior. The origin is the scanner's.
+  /// To the axes of frame W in millimetres: x to the patient's left, y cranial, z anterior. The origin is the
+  /// scanner's.
   Eigen::Affine3d W_from_index = Eigen::Affine3d::Identity();
 
   [[nodiscard]] std::size_t Index(int i, int j, int k) const {

@@ -8,15 +8,15 @@ namespace fulcrum::scene {
 namespace {
 
 constexpr int kSmoothing = 60;
-/// Shares of the way to the mean of the neighbours, in turns: the second step undoes the shrinking of the first, not the
-/// smoothing (Taubin 1995).
+/// Shares of the way to the mean of the neighbours, in turns: the second step undoes the shrinking of the first, not
+/// the smoothing (Taubin 1995).
 constexpr double kRelax[2] = {0.6, -0.613};
 constexpr double kLargest = 0.49;  ///< Of a voxel, away from the middle of the vertex' cube.
 
 /// A vertex in the middle of eight voxels of which not all have one label, with neighbours across its cube's faces.
 struct Net {
-  std::vector<Vec3d> start, now;                   ///< In voxels.
-  std::vector<std::array<Index, 6>> neighbours;    ///< kNoIndex: none.
+  std::vector<Vec3d> start, now;                 ///< In voxels.
+  std::vector<std::array<Index, 6>> neighbours;  ///< kNoIndex: none.
 };
 
 class NetBuilder {
@@ -45,8 +45,8 @@ class NetBuilder {
   }
   /// Cube (i, j, k) lies between voxels i - 1 and i, and so on.
   [[nodiscard]] std::size_t Cube(int i, int j, int k) const {
-    return static_cast<std::size_t>(i) +
-           static_cast<std::size_t>(cubes_[0]) * (static_cast<std::size_t>(j) + static_cast<std::size_t>(cubes_[1]) * k);
+    return static_cast<std::size_t>(i) + static_cast<std::size_t>(cubes_[0]) *
+                                             (static_cast<std::size_t>(j) + static_cast<std::size_t>(cubes_[1]) * k);
   }
 
   void PlaceVertices() {

@@ -49,18 +49,18 @@ struct ImportSettings {
   int organ_triangles_max = 14000;  ///< The embedded surface is decimated to this many triangles.
   /// The organ's centre line, caudal end first, in the frame of the files [m]; empty: found.
   std::vector<Vec3f> centreline_m;
-  bool patch = false;  ///< The membrane covers a patch, whether or not the organ is a tube.
-  std::optional<Vec3f> patch_at_m;                 ///< Its middle, in the frame of the files; none: found.
-  double patch_width_m = 0, patch_length_m = 0;    ///< 0: most of the organ as seen from outside.
+  bool patch = false;                            ///< The membrane covers a patch, whether or not the organ is a tube.
+  std::optional<Vec3f> patch_at_m;               ///< Its middle, in the frame of the files; none: found.
+  double patch_width_m = 0, patch_length_m = 0;  ///< 0: most of the organ as seen from outside.
   /// The stretch under the membrane, as fractions of the centre line's length; beyond it the organ is fixed.
   double from = 0.1, to = 0.9;
   /// Direction from the organ to the middle of the membrane, in the frame of the files; none: found, or z with a given
   /// centre line.
   std::optional<Vec3f> facing;
-  double sector_rad = 2.2;        ///< Angle around the organ over which the membrane follows it.
-  double flare_m = 0.010;         ///< Length by which the membrane then continues away from the organ on either side.
-  double bed_m = 0.025;           ///< Length of a fixed surface that continues it on either side.
-  double cavity_m = 0;            ///< Radius of a wall around the stretch, seen from inside; 0: none.
+  double sector_rad = 2.2;  ///< Angle around the organ over which the membrane follows it.
+  double flare_m = 0.010;   ///< Length by which the membrane then continues away from the organ on either side.
+  double bed_m = 0.025;     ///< Length of a fixed surface that continues it on either side.
+  double cavity_m = 0;      ///< Radius of a wall around the stretch, seen from inside; 0: none.
   struct Surrounding {
     std::string name;
     SurfaceRole role = SurfaceRole::kOther;

@@ -81,8 +81,8 @@ Grid<double> OuterRadius(const ImportSettings& import, const CentreLine& line, c
   }
   if (missed > kMissedRays * kRadiusRows * kRadiusAngles) {
     throw SpotError(name + ": " + std::to_string(100 * missed / (kRadiusRows * kRadiusAngles)) +
-                     " % of the rays from the centre line do not leave the organ; valid: at most " +
-                     std::to_string(static_cast<int>(100 * kMissedRays)) + " %. The centre line must run inside it",
+                        " % of the rays from the centre line do not leave the organ; valid: at most " +
+                        std::to_string(static_cast<int>(100 * kMissedRays)) + " %. The centre line must run inside it",
                     {{organ}, outside});
   }
   mean /= kRadiusRows * kRadiusAngles - missed;

@@ -78,14 +78,20 @@ std::vector<Vec3d> ObstaclesOf(const Anatomy& anatomy) {
   return obstacles;
 }
 
-/// Distance of the nearest obstacle from the line between `from` and `target`, without its last 20 mm; at most `most`.
-double Clearance(const std::vector<Vec3d>& obstacles, const Vec3d& from, const Vec3d& target, double most) {
-  constexpr double kNear = 0.02;
+/// Room that a shaft or a line of sight needs.
+struct Room {
+  double radius;  ///< Around it [m].
+  double near;    ///< Length of its end where it may be nearer to tissue [m].
+};
+constexpr Room kShaft{0.006, 0.02}, kScope{0.015, 0.04};
+
+/// Distance of the nearest obstacle from the line between `from` and `target`, without its end; at most `room.radius`.
+double Clearance(const std::vector<Vec3d>& obstacles, const Vec3d& from, const Vec3d& target, const Room& room) {
   const Vec3d along = from - target;
   const double length = along.norm();
-  double least = most;
+  double least = room.radius;
   for (const Vec3d& p : obstacles) {
-    const double f = std::clamp((p - target).dot(along) / (length * length), std::min(1.0, kNear / length), 1.0);
+    const double f = std::clamp((p - target).dot(along) / (length * length), std::min(1.0, room.near / length), 1.0);
     least = std::min(least, (target + f * along - p).norm());
   }
   return least;
@@ -93,7 +99,7 @@ double Clearance(const std::vector<Vec3d>& obstacles, const Vec3d& from, const V
 
 /// The place of a trocar around the membrane's middle, at this distance, that has enough room for its shaft on the way
 /// to `target`: the wanted one, else a steeper one, else one with another bearing; if none has, the one with the most.
-Vec3d Trocar(const Vec3d& wanted, const Vec3d& target, double enough, const std::vector<Vec3d>& obstacles) {
+Vec3d Trocar(const Vec3d& wanted, const Vec3d& target, const Room& wants, const std::vector<Vec3d>& obstacles) {
   constexpr int kSteeper = 5, kBearings = 9;
   constexpr double kStep_rad = 0.22, kTurn_rad = 0.35;
   const double distance = wanted.norm(), bearing = std::atan2(wanted.y(), wanted.x()),
@@ -105,9 +111,10 @@ Vec3d Trocar(const Vec3d& wanted, const Vec3d& target, double enough, const std:
     const double turned = bearing + kTurn_rad * ((b + 1) / 2) * (b % 2 != 0 ? 1 : -1);
     for (int e = 0; e < kSteeper; ++e) {
       const double up = std::min(elevation + kStep_rad * e, 1.4);
-      const Vec3d trocar = distance * Vec3d(std::cos(up) * std::cos(turned), std::cos(up) * std::sin(turned), std::sin(up));
-      const double room = Clearance(obstacles, trocar, target, enough);
-      if (room >= enough) return trocar;
+      const Vec3d trocar =
+          distance * Vec3d(std::cos(up) * std::cos(turned), std::cos(up) * std::sin(turned), std::sin(up));
+      const double room = Clearance(obstacles, trocar, target, wants);
+      if (room >= wants.radius) return trocar;
       if (room > most) {
         most = room;
         best = trocar;
@@ -118,7 +125,6 @@ Vec3d Trocar(const Vec3d& wanted, const Vec3d& target, double enough, const std:
 }
 
 const Vec3d kScopeDirection = Vec3d(0.05, -0.71, 0.70).normalized();
-constexpr double kScopeRoom_m = 0.02, kShaftRoom_m = 0.006;
 
 double ScopeDistance(const SheetSize& size) {
   return std::clamp(1.2 * std::max(size.width, 0.5 * size.length), 0.06, 0.14);
@@ -149,14 +155,14 @@ void ChooseSide(NewScene* scene, ImportSettings* import, const Take& take, Anato
   constexpr double kDistance_m = 0.09;
   const auto room = [&](const Anatomy& at) {
     const std::vector<Vec3d> obstacles = ObstaclesOf(at);
-    const Vec3d scope = Trocar(kDistance_m * kScopeDirection, Vec3d::Zero(), kScopeRoom_m, obstacles);
-    return Clearance(obstacles, scope, Vec3d::Zero(), kScopeRoom_m) * (1 - CrowdedPart(at));
+    const Vec3d scope = Trocar(kDistance_m * kScopeDirection, Vec3d::Zero(), kScope, obstacles);
+    return Clearance(obstacles, scope, Vec3d::Zero(), kScope) * (1 - CrowdedPart(at));
   };
   double most = room(*anatomy);
   const Vec3d behind(0, 0, -1);
   for (const Vec3d& side : {Vec3d(0, 0, 1), Vec3d(1, 0, 1), Vec3d(-1, 0, 1), Vec3d(1, 0, 0), Vec3d(-1, 0, 0), behind}) {
     // No surgeon comes from behind if there is any other way.
-    if (most >= kScopeRoom_m || (side == behind && most > kShaftRoom_m)) return;
+    if (most >= kScope.radius || (side == behind && most > kShaft.radius)) return;
     const std::optional<Vec3f> before = import->facing;
     import->facing = side.cast<float>();
     try {
@@ -190,7 +196,8 @@ std::string OrganText(const NewScene& scene, const ImportSettings& import, bool 
   text += Text("    cavity_mm: %.0f\n", 1e3 * import.cavity_m);
   if (!scene.surroundings.empty()) text += "    surroundings:\n";
   for (const ImportSettings::Surrounding& s : scene.surroundings) {
-    text += "      - {name: " + s.name + ", role: " + std::string(RoleName(s.role)) + ", file: " + s.file.filename().string() +
+    text += "      - {name: " + s.name + ", role: " + std::string(RoleName(s.role)) +
+            ", file: " + s.file.filename().string() +
             Text(", triangles_max: %d%s}\n", s.triangles_max, s.collides ? ", collides: true" : "");
   }
   return text;
@@ -202,14 +209,18 @@ std::string ScriptText(const SheetSize& size, const Vec3d& hook_wait_mm) {
   const double lift_mm = 1e3 * std::min(0.020, 0.25 * std::min(size.width, size.length));
   const double cut = std::min(kLongestCut, 0.4 * size.length);
   const double from = 0.5 - 0.5 * cut / size.length, to = 0.5 + 0.5 * cut / size.length;
-  const double grasp = std::max(0.2, 0.5 - kGraspBeside / size.width), at = std::min(0.7, 0.5 + kCutBeside / size.width);
+  const double grasp = std::max(0.2, 0.5 - kGraspBeside / size.width),
+               at = std::min(0.7, 0.5 + kCutBeside / size.width);
   const double press_mm = 0.15 * lift_mm, start_s = 7.3, end_s = start_s + cut / kSpeed;
   const std::string fold = Text("sheet: [%.3f, 0.5]", grasp);
-  std::string text = Text("script:                          # places: fractions (across, along) of the membrane and the "
-                          "height above it\n  duration_s: %.1f\n", end_s + 5.2);
+  std::string text = Text(
+      "script:                          # places: fractions (across, along) of the membrane and the "
+      "height above it\n  duration_s: %.1f\n",
+      end_s + 5.2);
   text += "  tool0:                         # closes on a fold, lifts it, releases it\n";
   const auto left = [&](double time_s, double height_mm, double jaw_deg) {
-    text += Text("    - {time_s: %.1f, %s, height_mm: %.1f, jaw_deg: %.0f}\n", time_s, fold.c_str(), height_mm, jaw_deg);
+    text +=
+        Text("    - {time_s: %.1f, %s, height_mm: %.1f, jaw_deg: %.0f}\n", time_s, fold.c_str(), height_mm, jaw_deg);
   };
   left(0, 45, 50);
   left(1.2, 10, 50);
@@ -226,7 +237,8 @@ std::string ScriptText(const SheetSize& size, const Vec3d& hook_wait_mm) {
   const auto right = [&](double time_s, double t, double height_mm, const char* more) {
     text += Text("    - {time_s: %.1f, sheet: [%.3f, %.3f], height_mm: %.1f%s}\n", time_s, at, t, height_mm, more);
   };
-  const std::string aside = Text(", offset_mm: [%.0f, %.0f, %.0f]", hook_wait_mm.x(), hook_wait_mm.y(), hook_wait_mm.z());
+  const std::string aside =
+      Text(", offset_mm: [%.0f, %.0f, %.0f]", hook_wait_mm.x(), hook_wait_mm.y(), hook_wait_mm.z());
   right(0, from, 25, aside.c_str());
   right(4.5, from, 25, aside.c_str());
   right(6.3, from, 10, "");
@@ -279,32 +291,40 @@ std::string DescribeNewScene(const NewScene& given, const Progress& progress) {
   double radius = 0;
   for (const Vec3d& p : anatomy.organ_vertices) radius = std::max(radius, p.norm());
   import.cavity_m = std::max(0.085, 1.15 * radius);
-  const Vec3d scope = 1e3 * Trocar(ScopeDistance(size) * kScopeDirection, Vec3d::Zero(), kScopeRoom_m, obstacles);
-  const Vec3d grasper = 1e3 * Trocar(Vec3d(-0.085, -0.045, 0.092), Vec3d(-0.01, 0, 0), kShaftRoom_m, obstacles);
-  const Vec3d hook = 1e3 * Trocar(Vec3d(0.098, 0, 0.034), Vec3d(0.003, 0, 0), kShaftRoom_m, obstacles);
+  const Vec3d scope = 1e3 * Trocar(ScopeDistance(size) * kScopeDirection, Vec3d::Zero(), kScope, obstacles);
+  const Vec3d grasper = 1e3 * Trocar(Vec3d(-0.085, -0.045, 0.092), Vec3d(-0.01, 0, 0), kShaft, obstacles);
+  const Vec3d hook = 1e3 * Trocar(Vec3d(0.098, 0, 0.034), Vec3d(0.003, 0, 0), kShaft, obstacles);
   const MembraneSettings& m = settings.membrane;
-  std::string text = "# " + Text("Made from %s: a membrane of %.0f x %.0f mm.", scene.mesh.filename().c_str(),
-                                 1e3 * size.width, 1e3 * size.length) +
+  std::string text = "# " +
+                     Text("Made from %s: a membrane of %.0f x %.0f mm.", scene.mesh.filename().c_str(),
+                          1e3 * size.width, 1e3 * size.length) +
                      "\n# The membrane's middle is the origin of the scene, z leads away from the organ, y along it. "
                      "Every key: services/scene/README.md.\n" +
-                     "name: \"" + scene.name + "\"\n" + "description: \"Organ from " + scene.mesh.filename().string() + "\"\n\n";
+                     "name: \"" + scene.name + "\"\n" + "description: \"Organ from " + scene.mesh.filename().string() +
+                     "\"\n\n";
   text += OrganText(scene, import, anatomy.is_patch) + "\n";
-  text += Text("membrane:\n  rows: %d\n  cols: %d\n  gap_mm: %.1f                  # fat between membrane and organ\n"
-               "  binding_reach_mm: %.1f\n\n",
-               m.rows, m.cols, 1e3 * m.gap_m, 1e3 * m.binding_reach_m);
-  text += "tools:\n  tool0: {kind: grasper, trocar_mm: " + TextOf(grasper) + "}\n  tool1: {kind: hook, trocar_mm: " +
-          TextOf(hook) + "}      # low at the side, so that the foot points down\n\n";
-  text += "physics:\n  mode: accurate\n  preset: default\n  damping_per_s: 20\n  gravity_m_s2: [0, 0, 0]        # the rest "
-          "shape already is the shape under gravity\n  membrane_Et_N_per_m: 150\n  membrane_stiffening: 1\n"
-          "  membrane_prestrain: 0.04\n  membrane_bending_uNm: 2\n  fat_youngs_modulus_kPa: 3\n"
-          "  tube_youngs_modulus_kPa: 100   # of the organ\n  tube_poisson: 0.45\n  grasp_radius_mm: 4\n  grip_force_N: 8\n\n";
-  text += "thermal:                         # peritoneum on fat\n  cell_um: 100\n  thickness_mm: 0.3\n"
-          "  conductivity_W_mK: 0.45\n  latent_heat_J_m3: 1.6e9\n  sigma_S_m: 0.35\n  sigma_fat_S_m: 0.035\n"
-          "  fat_depth_mm: 5\n  v_max_V: 350\n  hook_radius_mm: 0.5\n\n";
+  text += Text(
+      "membrane:\n  rows: %d\n  cols: %d\n  gap_mm: %.1f                  # fat between membrane and organ\n"
+      "  binding_reach_mm: %.1f\n\n",
+      m.rows, m.cols, 1e3 * m.gap_m, 1e3 * m.binding_reach_m);
+  text += "tools:\n  tool0: {kind: grasper, trocar_mm: " + TextOf(grasper) +
+          "}\n  tool1: {kind: hook, trocar_mm: " + TextOf(hook) +
+          "}      # low at the side, so that the foot points down\n\n";
+  text +=
+      "physics:\n  mode: accurate\n  preset: default\n  damping_per_s: 20\n  gravity_m_s2: [0, 0, 0]        # the rest "
+      "shape already is the shape under gravity\n  membrane_Et_N_per_m: 150\n  membrane_stiffening: 1\n"
+      "  membrane_prestrain: 0.04\n  membrane_bending_uNm: 2\n  fat_youngs_modulus_kPa: 3\n"
+      "  tube_youngs_modulus_kPa: 100   # of the organ\n  tube_poisson: 0.45\n  grasp_radius_mm: 4\n  grip_force_N: "
+      "8\n\n";
+  text +=
+      "thermal:                         # peritoneum on fat\n  cell_um: 100\n  thickness_mm: 0.3\n"
+      "  conductivity_W_mK: 0.45\n  latent_heat_J_m3: 1.6e9\n  sigma_S_m: 0.35\n  sigma_fat_S_m: 0.035\n"
+      "  fat_depth_mm: 5\n  v_max_V: 350\n  hook_radius_mm: 0.5\n\n";
   text += "haptics: {force_limit_N: 3.3, slew_N_per_ms: 0.4, force_scale: 0.3}\n\n";
-  text += Text("render:\n  width: 960\n  height: 540\n  rate_Hz: 15\n  png_rate_Hz: 2\n  scope_tip_mm: [%.0f, %.0f, %.0f]\n"
-               "  scope_target_mm: [0, 0, 0]\n  fov_deg: 60\n  scope_angle_deg: 30\n\n",
-               scope.x(), scope.y(), scope.z());
+  text += Text(
+      "render:\n  width: 960\n  height: 540\n  rate_Hz: 15\n  png_rate_Hz: 2\n  scope_tip_mm: [%.0f, %.0f, %.0f]\n"
+      "  scope_target_mm: [0, 0, 0]\n  fov_deg: 60\n  scope_angle_deg: 30\n\n",
+      scope.x(), scope.y(), scope.z());
   return text + ScriptText(size, Vec3d(10, -40, 5));
 }
 

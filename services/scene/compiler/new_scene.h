@@ -15,10 +15,10 @@ namespace fulcrum::scene {
 struct NewScene {
   std::string name;
   std::filesystem::path mesh;
-  std::string mesh_text;             ///< As the description shall name the file.
-  std::string unit;                  ///< Empty: the one in which the organ has a likely size.
-  std::optional<Vec3d> at_mm;        ///< Middle of the membrane, in the frame of the file.
-  std::optional<Vec3d> facing;       ///< From the organ to the membrane, in the frame of the file.
+  std::string mesh_text;        ///< As the description shall name the file.
+  std::string unit;             ///< Empty: the one in which the organ has a likely size.
+  std::optional<Vec3d> at_mm;   ///< Middle of the membrane, in the frame of the file.
+  std::optional<Vec3d> facing;  ///< From the organ to the membrane, in the frame of the file.
   /// In files beside that of the organ, in the same frame. Scope and tools are placed clear of them and, without
   /// `facing`, the membrane on a side that can be seen.
   std::vector<ImportSettings::Surrounding> surroundings;

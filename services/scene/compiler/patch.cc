@@ -10,12 +10,12 @@
 namespace fulcrum::scene {
 namespace {
 
-constexpr double kSteepest = 1.2;       ///< Slope of the sheet beside something that protrudes: 50 degrees.
-constexpr double kLeastCovered = 0.5;   ///< Share of the rectangle below which there must be organ.
+constexpr double kSteepest = 1.2;      ///< Slope of the sheet beside something that protrudes: 50 degrees.
+constexpr double kLeastCovered = 0.5;  ///< Share of the rectangle below which there must be organ.
 constexpr int kHeightSmoothing = 6, kPatchSmoothing = 20, kPatchRounds = 4;
 /// The gap decreases over this share of the patch, or this many gaps if that is more, to …
 constexpr double kRimTaper = 0.15, kGapsOfTaper = 3.5;
-constexpr double kRimGap = 0.12;        ///< … this share of it at the rim.
+constexpr double kRimGap = 0.12;  ///< … this share of it at the rim.
 
 /// The lowest surface above `heights` that is nowhere steeper than kSteepest: the envelope of cones under every sample.
 /// Two passes over the eight neighbours (a chamfer transform).
@@ -66,12 +66,13 @@ Vec3d Up(int /*row*/) { return Vec3d::UnitZ(); }
 std::vector<Vec3d> DrapePatch(double width, double length, const MembraneSettings& membrane, const TriangleMesh& organ,
                               const std::string& name) {
   Grid<double> heights = HeightsOf(organ, width, length);
-  const auto covered = std::count_if(heights.values.begin(), heights.values.end(), [](double h) { return h > kNoHeight; });
+  const auto covered =
+      std::count_if(heights.values.begin(), heights.values.end(), [](double h) { return h > kNoHeight; });
   if (static_cast<double>(covered) < kLeastCovered * static_cast<double>(heights.values.size())) {
     throw SpotError(name + ": below " + std::to_string(100 - 100 * covered / (kHeightSamples * kHeightSamples)) +
-                     " % of the membrane's patch there is no organ; valid: at most " +
-                     std::to_string(static_cast<int>(100 - 100 * kLeastCovered)) +
-                     " %. Choose another `at_mm` or `facing`, or a smaller `width_mm` and `length_mm`",
+                        " % of the membrane's patch there is no organ; valid: at most " +
+                        std::to_string(static_cast<int>(100 - 100 * kLeastCovered)) +
+                        " %. Choose another `at_mm` or `facing`, or a smaller `width_mm` and `length_mm`",
                     {{organ}, Vec3d::Zero()});
   }
   LimitSlope(width / (kHeightSamples - 1), length / (kHeightSamples - 1), &heights);

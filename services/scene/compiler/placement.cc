@@ -187,7 +187,8 @@ Vec3d NormalAround(const TriangleMesh& surface, const Vec3d& p, Vec3d* nearest) 
 /// The organ's outline as seen from above.
 class Silhouette {
  public:
-  Silhouette(const Grid<double>& heights, double width, double length) : width_(width), length_(length), covered_(heights) {
+  Silhouette(const Grid<double>& heights, double width, double length)
+      : width_(width), length_(length), covered_(heights) {
     for (double& value : covered_.values) value = value > kNoHeight ? 1 : 0;
   }
 
@@ -291,8 +292,7 @@ std::vector<Vec3d> FindCentreLine(const TriangleMesh& surface) {
   // Bands of distance from an end lie oblique to the tube; bands along the line itself do not.
   for (int round = 0; round < kRounds; ++round) {
     const double length = LengthOf(line);
-    line = MiddlesOfBands(surface,
-                          [&](const Triangle&, const Vec3d& p) { return FootOn(p, line).along / length; });
+    line = MiddlesOfBands(surface, [&](const Triangle&, const Vec3d& p) { return FootOn(p, line).along / length; });
     if (line.size() < 3) return {};
   }
   if (!IsLong(surface, line)) return {};

@@ -24,13 +24,13 @@ struct Placement {
 /// less than twice as long as thick. `surface` is closed, its triangles about equally large.
 std::vector<Vec3d> FindCentreLine(const TriangleMesh& surface);
 
-/// Placements of a tube along `line`, the best guess first: z is `import.facing` if given, else the nearest to the files'
-/// z axis, across the line, then the other sides in turn.
+/// Placements of a tube along `line`, the best guess first: z is `import.facing` if given, else the nearest to the
+/// files' z axis, across the line, then the other sides in turn.
 std::vector<Placement> PlacesOfTube(const std::vector<Vec3d>& line, const ImportSettings& import);
 
 /// Placement of any body, seen along `import.facing`, else along the normal at `import.patch_at_m`, else along its
-/// shortest principal axis. The patch lies around `import.patch_at_m`, else where the body's outline is widest, and is as
-/// large as that permits.
+/// shortest principal axis. The patch lies around `import.patch_at_m`, else where the body's outline is widest, and is
+/// as large as that permits.
 Placement PlacePatch(const TriangleMesh& surface, const ImportSettings& import);
 
 /// The longest side of the box around points [m].

@@ -43,7 +43,8 @@ struct Bounds {
 /// Size of a pixel at which everything between the bounds is seen.
 double PixelFor(const Bounds& bounds, const Vec3d& right, const Vec3d& up) {
   const Vec3d half = 0.5 * (bounds.high - bounds.low);
-  return std::max(right.cwiseAbs().dot(half) / (0.5 * kFill * kWidth), up.cwiseAbs().dot(half) / (0.5 * kFill * kHeight));
+  return std::max(right.cwiseAbs().dot(half) / (0.5 * kFill * kWidth),
+                  up.cwiseAbs().dot(half) / (0.5 * kFill * kHeight));
 }
 
 struct Direction {
@@ -149,7 +150,8 @@ class ScenePainter {
 std::string PreviewOf(const SceneView& scene) {
   const ScenePainter painter(scene);
   const Vec3d eye = (scene.render.scope_tip_W - scene.render.scope_target_W).cast<double>().normalized();
-  const Vec3d right = Vec3d(Vec3d::UnitZ().cross(eye).norm() > 1e-3 ? Vec3d::UnitZ().cross(eye) : Vec3d::UnitX()).normalized();
+  const Vec3d right =
+      Vec3d(Vec3d::UnitZ().cross(eye).norm() > 1e-3 ? Vec3d::UnitZ().cross(eye) : Vec3d::UnitX()).normalized();
   const std::array<Direction, 4> directions = {Direction{"as the scope sees it", right, eye.cross(right)},
                                                Direction{"from above (z)", Vec3d::UnitX(), Vec3d::UnitY()},
                                                Direction{"from the patient's left (x)", Vec3d::UnitY(), Vec3d::UnitZ()},

@@ -107,7 +107,8 @@ void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Fol
     for (const auto& base : bases) folders->push_back(base / folder);
   }
   folders->insert(folders->end(), bases.begin(), bases.end());
-  import->scale_m = map.Choice("unit", import->scale_m, kLengthUnits) * map.Number("scale", 1, Range::Between(1e-3, 1e3));
+  import->scale_m =
+      map.Choice("unit", import->scale_m, kLengthUnits) * map.Number("scale", 1, Range::Between(1e-3, 1e3));
   import->origin_m = map.Vector3Si("origin_mm", import->origin_m, Range::Between(-2000, 2000));
   import->organ_file = FindFile(map, "organ", map.Text("organ"), *folders);
   import->remesh = map.Flag("remesh", import->remesh);
@@ -124,7 +125,8 @@ void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Fol
   if (auto line = map.OptionalMap("centreline")) ReadCentreline(*line, &import->centreline_m);
   if (auto patch = map.OptionalMap("patch")) {
     if (!import->centreline_m.empty()) {
-      map.Fail("patch", "and centreline exclude each other: the membrane covers a stretch of the organ or a patch of it");
+      map.Fail("patch",
+               "and centreline exclude each other: the membrane covers a stretch of the organ or a patch of it");
     }
     ReadPatch(*patch, import);
   }

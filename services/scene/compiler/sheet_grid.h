@@ -67,8 +67,8 @@ void PushOut(const TriangleMesh& organ, const TriangleLocator& locator, double r
 /// Spaces the nodes evenly along each row, then along each column.
 void Spread(SheetGrid* sheet);
 
-/// A node beside a fold, which is a crease of more than 90 degrees between neighbouring nodes, or where the middle of row
-/// r does not face `up(r)`; row and column.
+/// A node beside a fold, which is a crease of more than 90 degrees between neighbouring nodes, or where the middle of
+/// row r does not face `up(r)`; row and column.
 std::optional<std::pair<int, int>> FoldOf(const SheetGrid& sheet, const std::function<Vec3d(int)>& up);
 
 /// Throws SpotError "name: ..., advice" at a fold.

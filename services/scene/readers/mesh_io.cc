@@ -83,9 +83,9 @@ MeshFile Choose(std::string_view bytes, const std::filesystem::path& name, const
     return ReadOff(bytes, text);
   }
   using Reader = MeshFile (*)(std::string_view, const std::string&);
-  static const std::map<std::string, Reader> kByExtension = {
-      {".stl", ReadStl}, {".msh", ReadGmsh}, {".vtk", ReadVtk}, {".vtu", ReadVtu}, {".vtp", ReadVtu},
-      {".ply", ReadPly}, {".obj", ReadObj},  {".off", ReadOff}};
+  static const std::map<std::string, Reader> kByExtension = {{".stl", ReadStl}, {".msh", ReadGmsh}, {".vtk", ReadVtk},
+                                                             {".vtu", ReadVtu}, {".vtp", ReadVtu},  {".ply", ReadPly},
+                                                             {".obj", ReadObj}, {".off", ReadOff}};
   if (const auto reader = kByExtension.find(extension); reader != kByExtension.end()) {
     return reader->second(bytes, text);
   }

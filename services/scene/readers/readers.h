@@ -27,7 +27,8 @@ MeshFile ReadPly(std::string_view bytes, const std::string& name);
 MeshFile ReadGmsh(std::string_view bytes, const std::string& name);
 /// Legacy files of versions 1 to 5, ASCII and binary: polygonal data and unstructured grids.
 MeshFile ReadVtk(std::string_view bytes, const std::string& name);
-/// XML unstructured grids (.vtu) and polygonal data (.vtp): ASCII, base64 inline, appended raw or base64; plain or zlib-compressed.
+/// XML unstructured grids (.vtu) and polygonal data (.vtp): ASCII, base64 inline, appended raw or base64; plain or
+/// zlib-compressed.
 MeshFile ReadVtu(std::string_view bytes, const std::string& name);
 /// Nodes of a .node file and either the tetrahedra of an .ele file or the triangles of a .face file.
 MeshFile ReadTetgen(std::string_view nodes, const std::string& nodes_name, std::string_view elements,

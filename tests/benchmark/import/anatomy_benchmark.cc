@@ -1,5 +1,5 @@
-// From a synthetic pelvis of 256 x 256 x 256 voxels to a scene: time, distance of the meshes from the true surfaces, and
-// whether left stays left for every order and sense of the axes.
+// From a synthetic pelvis of 256 x 256 x 256 voxels to a scene: time, distance of the meshes from the true surfaces,
+// and whether left stays left for every order and sense of the axes.
 #include "tests/benchmark/import/anatomy_benchmark.h"
 
 #include <algorithm>
@@ -46,9 +46,9 @@ scene::LabelMap Voxels(const std::vector<Part>& parts, int n, const Mat3d& ras, 
 /// Runs the compiler as a user would. Returns seconds; negative: it failed.
 double Import(const fs::path& labels, const fs::path& uses, const fs::path& out, const fs::path& log) {
   const auto start = std::chrono::steady_clock::now();
-  runtime::ChildProcess compiler = runtime::ChildProcess::Start(
-      fs::path(FULCRUM_BIN_DIR) / "scene_compiler",
-      {"--anatomy", labels.string(), "--map", uses.string(), "--out", out.string()}, log);
+  runtime::ChildProcess compiler =
+      runtime::ChildProcess::Start(fs::path(FULCRUM_BIN_DIR) / "scene_compiler",
+                                   {"--anatomy", labels.string(), "--map", uses.string(), "--out", out.string()}, log);
   for (;;) {
     if (const auto end = compiler.Poll()) {
       const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
@@ -79,8 +79,8 @@ void WriteUses(const fs::path& file, const std::vector<Part>& parts) {
   std::ofstream out(file);
   out << "labels:\n";
   for (const Part& part : parts) {
-    out << "  - {label: " << part.label << ", name: " << part.name << (part.is_organ ? ", organ: true" : ", role: other")
-        << ", triangles_max: 20000}\n";
+    out << "  - {label: " << part.label << ", name: " << part.name
+        << (part.is_organ ? ", organ: true" : ", role: other") << ", triangles_max: 20000}\n";
   }
 }
 
@@ -107,8 +107,8 @@ void MeasureAnatomy(Report* report, const fs::path& folder) {
   report->Add("import.hausdorff_voxels", seconds < 0 ? -1 : farthest / kVoxel_mm, "voxels");
 
   if (seconds >= 0) {
-    const supervisor::SceneRequest request{(out / "pelvis.yaml").string(), {}, {}, {}, fs::path(FULCRUM_BIN_DIR) / "scene_compiler",
-                                           folder / "cache"};
+    const supervisor::SceneRequest request{
+        (out / "pelvis.yaml").string(), {}, {}, {}, fs::path(FULCRUM_BIN_DIR) / "scene_compiler", folder / "cache"};
     const auto compile_s = [&] { return TimeMs(0, 1, [&] { (void)supervisor::ResolveScene(request); }).front() / 1e3; };
     report->Add("import.compile_s.pelvis", compile_s(), "s");
     report->Add("import.compile_s.unchanged", compile_s(), "s");

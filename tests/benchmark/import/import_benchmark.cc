@@ -1,5 +1,5 @@
-// How many organs of other people's files become a scene without a word on centre line or facing, how long it takes, and
-// whether a grasper can take hold of the membrane of the scene made around it and lift it. Each is compiled by the
+// How many organs of other people's files become a scene without a word on centre line or facing, how long it takes,
+// and whether a grasper can take hold of the membrane of the scene made around it and lift it. Each is compiled by the
 // program, as a user would, with a limit of time.
 #include <signal.h>
 #include <unistd.h>
@@ -119,8 +119,7 @@ void Run(Report* report, const fs::path& folder) {
     std::ofstream(yaml) << "name: organ\norgan:\n  import:\n    organ: " << mesh.filename().string() << "\n"
                         << (organ.options.empty() ? "" : "    " + organ.options + "\n")
                         << "membrane: {rows: 101, cols: 64}\nphysics: {mode: accurate}\n";
-    const Result result =
-        Compile({yaml.string(), "--out", (folder / "organ.fulcrum").string()}, folder / "organ.log");
+    const Result result = Compile({yaml.string(), "--out", (folder / "organ.fulcrum").string()}, folder / "organ.log");
     std::string fault;
     if (result.compiled && organ.is_sound) {
       fault = Operate(mesh, folder);
@@ -136,8 +135,8 @@ void Run(Report* report, const fs::path& folder) {
       refused_late += result.seconds > kRefusal_s ? 1 : 0;
     }
     std::fprintf(stderr, "%-34s %-9s %6.2f s  %s\n", organ.name.c_str(), organ.file.c_str(), result.seconds,
-                 !fault.empty()    ? fault.c_str()
-                 : result.compiled ? "operated"
+                 !fault.empty()     ? fault.c_str()
+                 : result.compiled  ? "operated"
                  : result.timed_out ? "no end"
                                     : result.last.c_str());
     fs::remove(mesh);

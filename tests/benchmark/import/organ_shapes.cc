@@ -89,21 +89,31 @@ std::vector<Named> Shapes() {
       {"spleen", Without(Ellipsoid(o, {60, 40, 22}), Ball({0, 0, -70}, 62)), 66},
       {"liver", liver, 104},
       {"gallbladder", Tube({{0, -38, 0}, {0, -10, 2}, {0, 18, 8}, {0, 40, 16}}, 17, 4), 58},
-      {"uterus", Union(Ellipsoid(o, {24, 36, 17}), Tube({{-48, 40, 0}, {-16, 22, 0}, {16, 22, 0}, {48, 40, 0}}, 4, 4), 8), 60},
-      {"stomach", Union(Tube(Curve(-0.6, 2.2, [](double a) { return Vec3d(55 * std::cos(a), 55 * std::sin(a), 0); }), 34, 14),
-                        Ball({44, -40, 0}, 38), 14), 112},
+      {"uterus",
+       Union(Ellipsoid(o, {24, 36, 17}), Tube({{-48, 40, 0}, {-16, 22, 0}, {16, 22, 0}, {48, 40, 0}}, 4, 4), 8), 60},
+      {"stomach",
+       Union(Tube(Curve(-0.6, 2.2, [](double a) { return Vec3d(55 * std::cos(a), 55 * std::sin(a), 0); }), 34, 14),
+             Ball({44, -40, 0}, 38), 14),
+       112},
       {"pancreas", Tube({{-70, -18, 0}, {-40, 0, 6}, {0, 6, 0}, {40, 12, -6}, {75, 26, -4}}, 17, 8), 96},
       {"heart", Bumpy(Union(Ellipsoid(o, {38, 48, 36}), Ball({18, 40, 6}, 22), 12), 2.5, 30), 72},
       {"lung", Without(Ellipsoid(o, {50, 90, 60}), Ellipsoid({30, -100, 0}, {80, 70, 80})), 98},
-      {"thyroid", Union(Union(Ellipsoid({-18, 0, 0}, {10, 26, 9}), Ellipsoid({18, 0, 0}, {10, 26, 9}), 2),
-                        Tube({{-18, -8, 0}, {18, -8, 0}}, 6, 6), 4), 32},
+      {"thyroid",
+       Union(Union(Ellipsoid({-18, 0, 0}, {10, 26, 9}), Ellipsoid({18, 0, 0}, {10, 26, 9}), 2),
+             Tube({{-18, -8, 0}, {18, -8, 0}}, 6, 6), 4),
+       32},
       {"rectum", Tube({{0, -80, 30}, {2, -40, 0}, {0, 0, -10}, {4, 40, 0}, {0, 80, 28}}, 17, 19), 108},
       {"colon", colon, 98},
-      {"sigmoid", Tube(Curve(-2, 2, [](double t) { return Vec3d(32 * std::sin(1.8 * t), 44 * t, 8 * t); }), 15, 15), 112},
-      {"bowel loop", Tube(Curve(0, 3.6, [](double a) { return Vec3d(46 * std::cos(a), 46 * std::sin(a), 6 * a); }), 13, 13), 74},
-      {"ureter", Tube(Curve(-1, 1, [](double t) { return Vec3d(12 * std::sin(2 * t), 120 * t, 10 * t * t); }), 3, 3), 130},
-      {"aorta", Union(Tube({{0, -90, 0}, {0, 10, 0}}, 11, 11),
-                      Union(Tube({{0, 8, 0}, {-26, 80, 8}}, 9, 7), Tube({{0, 8, 0}, {26, 80, 8}}, 9, 7), 3), 5), 106},
+      {"sigmoid", Tube(Curve(-2, 2, [](double t) { return Vec3d(32 * std::sin(1.8 * t), 44 * t, 8 * t); }), 15, 15),
+       112},
+      {"bowel loop",
+       Tube(Curve(0, 3.6, [](double a) { return Vec3d(46 * std::cos(a), 46 * std::sin(a), 6 * a); }), 13, 13), 74},
+      {"ureter", Tube(Curve(-1, 1, [](double t) { return Vec3d(12 * std::sin(2 * t), 120 * t, 10 * t * t); }), 3, 3),
+       130},
+      {"aorta",
+       Union(Tube({{0, -90, 0}, {0, 10, 0}}, 11, 11),
+             Union(Tube({{0, 8, 0}, {-26, 80, 8}}, 9, 7), Tube({{0, 8, 0}, {26, 80, 8}}, 9, 7), 3), 5),
+       106},
       {"ring", [](const Vec3d& p) { return std::hypot(std::hypot(p.x(), p.y()) - 34, p.z()) - 12; }, 52},
       {"plate", [](const Vec3d& p) { return (p.cwiseAbs() - Vec3d(50, 40, 5)).maxCoeff(); }, 58},
       {"cube", [](const Vec3d& p) { return (p.cwiseAbs() - Vec3d(25, 25, 25)).maxCoeff(); }, 32},
@@ -144,50 +154,62 @@ struct NamedFault {
 
 std::vector<NamedFault> Faults() {
   return {
-      {"turned triangles", "kidney", [](Random* r, TriangleMesh* m) {
+      {"turned triangles", "kidney",
+       [](Random* r, TriangleMesh* m) {
          for (Triangle& t : m->triangles)
            if (Uniform(r) < 0.3) std::swap(t[1], t[2]);
        }},
-      {"inside out", "gallbladder", [](Random*, TriangleMesh* m) {
+      {"inside out", "gallbladder",
+       [](Random*, TriangleMesh* m) {
          for (Triangle& t : m->triangles) std::swap(t[1], t[2]);
        }},
-      {"noise", "spleen", [](Random* r, TriangleMesh* m) {
+      {"noise", "spleen",
+       [](Random* r, TriangleMesh* m) {
          for (Vec3d& p : m->vertices) p += 0.8 * Vec3d(Uniform(r) - 0.5, Uniform(r) - 0.5, Uniform(r) - 0.5);
        }},
-      {"holes", "bladder", [](Random* r, TriangleMesh* m) {
+      {"holes", "bladder",
+       [](Random* r, TriangleMesh* m) {
          std::erase_if(m->triangles, [&](const Triangle&) { return Uniform(r) < 0.01; });
        }},
-      {"open end", "rectum", [](Random*, TriangleMesh* m) {
+      {"open end", "rectum",
+       [](Random*, TriangleMesh* m) {
          std::erase_if(m->triangles, [&](const Triangle& t) { return m->vertices[t[0]].y() > 70; });
        }},
-      {"both ends open", "colon", [](Random*, TriangleMesh* m) {
+      {"both ends open", "colon",
+       [](Random*, TriangleMesh* m) {
          std::erase_if(m->triangles, [&](const Triangle& t) { return std::abs(m->vertices[t[0]].y()) > 80; });
        }},
-      {"cracks", "heart", [](Random* r, TriangleMesh* m) {
+      {"cracks", "heart",
+       [](Random* r, TriangleMesh* m) {
          *m = Soup(*m);
          for (Vec3d& p : m->vertices) p += 0.01 * Vec3d(Uniform(r) - 0.5, Uniform(r) - 0.5, Uniform(r) - 0.5);
        }},
       {"double surface", "liver", [](Random*, TriangleMesh* m) { Append(TriangleMesh(*m), Vec3d(0.3, 0, 0), m); }},
-      {"crossing parts", "stomach", [](Random*, TriangleMesh* m) {
+      {"crossing parts", "stomach",
+       [](Random*, TriangleMesh* m) {
          Append(SurfaceOfShape(Ball({0, 0, 0}, 30), 36, 30), {55, 0, 0}, m);
        }},
-      {"crossing itself", "kidney", [](Random* r, TriangleMesh* m) {
+      {"crossing itself", "kidney",
+       [](Random* r, TriangleMesh* m) {
          for (Vec3d& p : m->vertices)
            if (Uniform(r) < 0.05) p += 9 * Vec3d(Uniform(r) - 0.5, Uniform(r) - 0.5, Uniform(r) - 0.5);
        }},
-      {"crumbs", "pancreas", [](Random* r, TriangleMesh* m) {
+      {"crumbs", "pancreas",
+       [](Random* r, TriangleMesh* m) {
          const TriangleMesh crumb = SurfaceOfShape(Ball({0, 0, 0}, 2), 3, 6);
          for (int i = 0; i < 20; ++i)
            Append(crumb, 90 * Vec3d(Uniform(r) - 0.5, Uniform(r) - 0.5, Uniform(r) - 0.5), m);
        }},
-      {"fin", "prostate", [](Random*, TriangleMesh* m) {
+      {"fin", "prostate",
+       [](Random*, TriangleMesh* m) {
          const Triangle t = m->triangles[m->triangles.size() / 2];
          m->vertices.push_back(1.3 * m->vertices[t[0]]);
          const auto tip = static_cast<Index>(m->vertices.size() - 1);
          m->triangles.push_back({t[0], t[1], tip});
          m->triangles.push_back({t[1], t[2], tip});
        }},
-      {"needles", "uterus", [](Random* r, TriangleMesh* m) {
+      {"needles", "uterus",
+       [](Random* r, TriangleMesh* m) {
          const std::size_t count = m->triangles.size();
          for (std::size_t i = 0; i < count; i += 5) {
            const Triangle t = m->triangles[i];
@@ -199,18 +221,21 @@ std::vector<NamedFault> Faults() {
            m->triangles.push_back({t[2], t[0], middle});
          }
        }},
-      {"duplicates and empty triangles", "thyroid", [](Random*, TriangleMesh* m) {
+      {"duplicates and empty triangles", "thyroid",
+       [](Random*, TriangleMesh* m) {
          const std::size_t count = m->triangles.size();
          for (std::size_t i = 0; i < count; i += 7) {
            m->triangles.push_back(m->triangles[i]);
            m->triangles.push_back({m->triangles[i][0], m->triangles[i][0], m->triangles[i][1]});
          }
        }},
-      {"far away", "ball", [](Random*, TriangleMesh* m) {
+      {"far away", "ball",
+       [](Random*, TriangleMesh* m) {
          for (Vec3d& p : m->vertices) p += Vec3d(900, -1400, 300);
        }},
       {"coarse", "bladder", [](Random*, TriangleMesh* m) { *m = scene::Decimate(*m, 120); }},
-      {"one sheet", "plate", [](Random*, TriangleMesh* m) {
+      {"one sheet", "plate",
+       [](Random*, TriangleMesh* m) {
          std::erase_if(m->triangles, [&](const Triangle& t) {
            return (m->vertices[t[0]].z() + m->vertices[t[1]].z() + m->vertices[t[2]].z()) < 10;
          });
@@ -322,12 +347,9 @@ std::vector<Part> Pelvis() {
   const Shape shell = [](const Vec3d& p) { return std::abs(p.norm() - 100) - 5; };
   const Shape back = [=](const Vec3d& p) { return std::max(shell(p), p.z() + 30); };
   // The ureters end in the bladder, the rectum at the wall.
-  return {{"rectum", 1, true, Without(rectum, back)},
-          {"bladder", 2, false, bladder},
-          {"prostate", 3, false, Without(prostate, rectum)},
-          {"left_ureter", 4, false, Without(left, bladder)},
-          {"right_ureter", 5, false, Without(right, bladder)},
-          {"wall", 6, false, back}};
+  return {{"rectum", 1, true, Without(rectum, back)},          {"bladder", 2, false, bladder},
+          {"prostate", 3, false, Without(prostate, rectum)},   {"left_ureter", 4, false, Without(left, bladder)},
+          {"right_ureter", 5, false, Without(right, bladder)}, {"wall", 6, false, back}};
 }
 
 std::vector<Organ> Organs() {

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <map>
+#include <random>
 #include <set>
 
 #include "services/base/core/error.h"
@@ -93,9 +95,9 @@ TEST_F(Segmentation, LeftStaysLeftForEveryOrderAndSenseOfTheAxes) {
     const Eigen::Affine3d ras_from_index = Around(ras, size);
     const LabelMap map = Fill(size, Eigen::Affine3d(fulcrum::testing::WFromRas() * ras_from_index), Mark);
     for (const bool by_quaternion : {false, true}) {
-      const fs::path file = Write(
-          "marks.nii.gz", fulcrum::testing::NiftiBytes(
-                              map, fulcrum::testing::NiftiHeader(map, ras_from_index, by_quaternion)));
+      const fs::path file =
+          Write("marks.nii.gz",
+                fulcrum::testing::NiftiBytes(map, fulcrum::testing::NiftiHeader(map, ras_from_index, by_quaternion)));
       const LabelMap read = ReadLabelMap(file);
       const auto surfaces = SurfacesOf(read, {1, 2, 3});
       ASSERT_EQ(surfaces.size(), 3u);
@@ -151,7 +153,8 @@ TEST_F(Segmentation, SurfacesAreClosedSharedAndWithinAVoxel) {
 }
 
 TEST_F(Segmentation, WhatIsNoLabelMapIsRefused) {
-  const LabelMap map = Fill({12, 12, 12}, Eigen::Affine3d::Identity(), [](const Vec3d& p) { return p.x() > 5 ? 1 : 0; });
+  const LabelMap map =
+      Fill({12, 12, 12}, Eigen::Affine3d::Identity(), [](const Vec3d& p) { return p.x() > 5 ? 1 : 0; });
   const nifti_1_header header = fulcrum::testing::NiftiHeader(map, Eigen::Affine3d::Identity(), false);
   const std::string bytes = fulcrum::testing::NiftiBytes(map, header);
   const auto refusal = [&](const std::string& content) {
@@ -198,8 +201,9 @@ TEST_F(Segmentation, UsesOfLabelsAreChecked) {
     std::ofstream(folder_ / "labels.yaml") << text;
     return Refusal([&] { (void)ReadLabelUses(folder_ / "labels.yaml"); });
   };
-  EXPECT_EQ(refusal("labels:\n  - {label: 1, name: rectum, organ: true}\n  - {label: 2, name: bladder, role: bladder}\n"),
-            "");
+  EXPECT_EQ(
+      refusal("labels:\n  - {label: 1, name: rectum, organ: true}\n  - {label: 2, name: bladder, role: bladder}\n"),
+      "");
   EXPECT_NE(refusal("labels:\n  - {label: 1, name: a}\n").find("one entry must have `organ: true`"), std::string::npos);
   EXPECT_NE(refusal("labels:\n  - {label: 1, name: a, organ: true}\n  - {label: 2, name: b, organ: true}\n")
                 .find("there is one already"),
@@ -207,14 +211,16 @@ TEST_F(Segmentation, UsesOfLabelsAreChecked) {
   EXPECT_NE(refusal("labels:\n  - {label: 1, name: ../a, organ: true}\n").find("it names a file"), std::string::npos);
   EXPECT_NE(refusal("labels:\n  - {label: 1, name: a, organ: true}\n  - {label: 1, name: b}\n").find("is there twice"),
             std::string::npos);
-  EXPECT_NE(refusal("labels:\n  - {label: 1, name: a, organ: true}\n  - {file: b.stl, name: b}\n").find("or all `file`"),
-            std::string::npos);
+  EXPECT_NE(
+      refusal("labels:\n  - {label: 1, name: a, organ: true}\n  - {file: b.stl, name: b}\n").find("or all `file`"),
+      std::string::npos);
   const std::string files = "labels:\n  - {file: a.stl, name: a, organ: true}\n";
   EXPECT_NE(refusal(files).find("axes"), std::string::npos) << "no default: a wrong guess would mirror";
   for (const char* axes : {"LAS", "LLS", "XYZ", "LP"}) {
     EXPECT_NE(refusal("axes: " + std::string(axes) + "\n" + files).find("do not mirror"), std::string::npos) << axes;
   }
-  for (const char* axes : {"LPS", "RAS", "LSA", "PIR"}) EXPECT_EQ(refusal("axes: " + std::string(axes) + "\n" + files), "");
+  for (const char* axes : {"LPS", "RAS", "LSA", "PIR"})
+    EXPECT_EQ(refusal("axes: " + std::string(axes) + "\n" + files), "");
 }
 
 TEST_F(Segmentation, ASegmentationBecomesAScene) {
@@ -223,7 +229,8 @@ TEST_F(Segmentation, ASegmentationBecomesAScene) {
     if (std::hypot(p.x(), p.z()) < 15 && std::abs(p.y()) < 50) return 3;
     return (p - Vec3d(0, 10, 32)).norm() < 15 ? 9 : 0;
   });
-  const fs::path file = Write("labels.nii.gz", fulcrum::testing::NiftiBytes(map, fulcrum::testing::NiftiHeader(map, ras, false)));
+  const fs::path file =
+      Write("labels.nii.gz", fulcrum::testing::NiftiBytes(map, fulcrum::testing::NiftiHeader(map, ras, false)));
   EXPECT_NE(SuggestLabelUses(file).find("{label: 3, name: label3, organ: true}"), std::string::npos);
   std::ofstream(folder_ / "labels.yaml")
       << "labels:\n  - {label: 3, name: rectum, organ: true}\n  - {label: 9, name: bladder, role: bladder}\n";
@@ -260,7 +267,8 @@ TEST_F(Segmentation, AFolderOfSurfacesBecomesAScene) {
   for (const auto& [number, mesh] : surfaces) {
     std::ofstream obj(folder_ / "surfaces" / (number == 1 ? "Rectum 1.obj" : "ball.obj"));
     // Left, posterior, superior, in metres.
-    for (const Vec3d& p : mesh.vertices) obj << "v " << 1e-3 * p.x() << " " << -1e-3 * p.z() << " " << 1e-3 * p.y() << "\n";
+    for (const Vec3d& p : mesh.vertices)
+      obj << "v " << 1e-3 * p.x() << " " << -1e-3 * p.z() << " " << 1e-3 * p.y() << "\n";
     for (const Triangle& t : mesh.triangles) obj << "f " << t[0] + 1 << " " << t[1] + 1 << " " << t[2] + 1 << "\n";
   }
   const std::string suggested = SuggestLabelUses(folder_ / "surfaces");

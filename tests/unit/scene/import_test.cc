@@ -128,7 +128,8 @@ TEST(Patch, LiesWhereItIsAsked) {
   // Off the pole it stays beside it.
   import.facing = Vec3f::UnitZ();
   import.patch_at_m = (centre + Vec3d(0.01, -0.005, 0.05)).cast<float>();
-  EXPECT_LT(PlacePatch(Ball(centre, 0.03), import).ToWorld(centre + Vec3d(0.006, -0.003, 0.03)).head<2>().norm(), 0.002);
+  EXPECT_LT(PlacePatch(Ball(centre, 0.03), import).ToWorld(centre + Vec3d(0.006, -0.003, 0.03)).head<2>().norm(),
+            0.002);
   import.patch_at_m.reset();
   import.facing = Vec3f(-1, 0, 0);
   const Placement side = PlacePatch(Ball(centre, 0.03), import);
@@ -241,7 +242,8 @@ TEST_F(Import, TheSameTwice) {
 TEST_F(Import, AWrongUnitIsRefusedWithTheRightOne) {
   Write("ball.obj", Ball({0, 0, 0}, 0.03), 1);
   const std::string refusal = Refusal("    organ: ball.obj\n");
-  EXPECT_NE(refusal.find("the organ is 0.06 mm long; valid: 8 to 1000 mm. with `unit: m`"), std::string::npos) << refusal;
+  EXPECT_NE(refusal.find("the organ is 0.06 mm long; valid: 8 to 1000 mm. with `unit: m`"), std::string::npos)
+      << refusal;
   ExpectSound(Build("    organ: ball.obj\n    unit: m\n").View());
   ExpectSound(Build("    organ: ball.obj\n    scale: 1000\n").View());
 }
@@ -252,7 +254,8 @@ TEST_F(Import, APatchBesideTheOrganIsRefusedWithAPicture) {
     (void)Build("    organ: ball.obj\n    patch: {width_mm: 300, length_mm: 300}\n");
     FAIL();
   } catch (const SpotError& error) {
-    EXPECT_NE(std::string(error.what()).find("there is no organ; valid: at most 50 %"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("there is no organ; valid: at most 50 %"), std::string::npos)
+        << error.what();
     EXPECT_EQ(PictureOf(error.spot()).substr(1, 3), "PNG");
   }
   EXPECT_NE(Refusal("    organ: ball.obj\n    patch: {}\n    centreline: {x_mm: [0, 0], y_mm: [-9, 9], z_mm: [0, 0]}\n")
@@ -267,7 +270,8 @@ TEST_F(Import, FaultyTetrahedraAreFilledAnew) {
          "0 0 60\n10 10 90\nCELLS 2 10\n4 0 1 2 3\n4 0 1 2 4\nCELL_TYPES 2\n10\n10\n";
   std::string said;
   const std::string text =
-      "name: x\norgan:\n  import:\n    organ: folded.vtk\n    target_tets: 900\nmembrane: {rows: 41, cols: 29, gap_mm: 2, "
+      "name: x\norgan:\n  import:\n    organ: folded.vtk\n    target_tets: 900\nmembrane: {rows: 41, cols: 29, gap_mm: "
+      "2, "
       "bending_row_stride: 4, bending_col_stride: 4}\n";
   const SceneData data = BuildScene(ParseSceneYaml(text, "x.yaml", folder_).settings,
                                     [&](const std::string& stage) { said += stage + "\n"; });

@@ -98,7 +98,9 @@ TEST(Repair, KeepsTheLargestPieceAndRefusesHoles) {
     (void)RepairSurface(mesh, {1e-5, false, 0}, "open.stl", &report);
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("open.stl: the surface is not closed (3 open edges in 1 opening, the longest around ("), std::string::npos)
+    EXPECT_NE(std::string(error.what())
+                  .find("open.stl: the surface is not closed (3 open edges in 1 opening, the longest around ("),
+              std::string::npos)
         << error.what();
   }
   EXPECT_THROW((void)RepairSurface({{Vec3d::Zero()}, {{0, 0, 0}}}, {1e-5, false, 0}, "x", &report), InputError);

@@ -93,7 +93,8 @@ std::string Off(const TriangleMesh& m) {
 
 std::string Vtp(const TriangleMesh& m) {
   Out out(Out::kText);
-  out << "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"LittleEndian\">\n<PolyData>\n"
+  out << "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" "
+         "byte_order=\"LittleEndian\">\n<PolyData>\n"
       << "<Piece NumberOfPoints=\"" << std::to_string(m.vertices.size())
       << "\" NumberOfVerts=\"0\" NumberOfLines=\"1\" NumberOfStrips=\"0\" NumberOfPolys=\""
       << std::to_string(m.triangles.size()) << "\">\n"

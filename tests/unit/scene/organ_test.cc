@@ -76,8 +76,9 @@ TEST(OpenSurface, IsRefusedUnlessTheSceneSaysWhatToDo) {
     (void)RepairSurface(OpenTube(), {}, "tube.stl", &report);
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("tube.stl: the surface is not closed (72 open edges in 2 openings, "
-                                             "the longest around ("),
+    EXPECT_NE(std::string(error.what())
+                  .find("tube.stl: the surface is not closed (72 open edges in 2 openings, "
+                        "the longest around ("),
               std::string::npos)
         << error.what();
     EXPECT_NE(std::string(error.what()).find("`cap_openings: true`"), std::string::npos);
