@@ -1,5 +1,6 @@
 // Loose fat between membrane and organ: yellow lobules, a thin veil over the organ's front and thick beside it, with
-// ureter and nerve shining through. coordinate: material (s, t) [m], thickness 0 … 1, bared share 0 … 1.
+// ureter and nerve shining through. coordinate: material (s, t) [m], thickness 0 … 1 or, towards a rim that is fused with the
+// organ, negative, bared share 0 … 1.
 in vec3 position;
 in vec3 normal;
 in vec4 coordinate;

@@ -31,7 +31,7 @@ Options:
                            script.seed: performs the script; may be repeated
   --check                  build the scene without writing it
   --preview FILE.png       draw the compiled scene from four sides
-  --limit SECONDS          give up after this time (default: 120)
+  --limit SECONDS          give up after this time (default: 300)
   --new NAME               write NAME.yaml (or --out) and the picture NAME.png beside it
   --from MESH              the organ: .stl, .obj, .off, .ply, .vtk, .vtp, .vtu, .msh, TetGen
   --unit U                 of the mesh: m, cm, mm, um (default: the one in which it has the size of an organ)

@@ -12,7 +12,7 @@ struct Arguments {
   std::string out, data, info, source, preview;
   std::string new_name, from, unit, at_mm, facing;  ///< A new scene: its name, its mesh, and what the user says of it.
   std::string anatomy, map;                         ///< A segmentation, and what becomes of its labels.
-  double limit_s = 120;
+  double limit_s = 300;
   bool list = false, check = false, quiet = false, help = false;
 };
 

@@ -102,10 +102,17 @@ void ShowingFaults(const fs::path& picture, const Work& work) {
   try {
     work();
   } catch (const scene::SpotError& error) {
-    WriteFile(picture, scene::PictureOf(error.spot()));
-    throw InputError(std::string(error.what()) + "; the place is drawn in " + picture.string());
+    std::string shown = "; the place is drawn in " + picture.string();
+    try {
+      WriteFile(picture, scene::PictureOf(error.spot()));
+    } catch (const std::exception&) {  // The reason counts more than its picture.
+      shown.clear();
+    }
+    throw InputError(error.what() + shown);
   }
 }
+
+constexpr int kFarthest_mm = 5000;
 
 /// "1,-2.5,3".
 std::optional<Vec3d> PointOf(const std::string& option, const std::string& text) {
@@ -119,6 +126,9 @@ std::optional<Vec3d> PointOf(const std::string& option, const std::string& text)
       throw InputError(option + " '" + text + "'; valid: three numbers as in 10,-2.5,40");
     }
     at = next + 1;
+  }
+  if (!point.allFinite() || point.cwiseAbs().maxCoeff() > kFarthest_mm) {
+    throw InputError(option + " '" + text + "'; valid: numbers of at most " + std::to_string(kFarthest_mm));
   }
   return point;
 }
@@ -155,18 +165,26 @@ void Compile(const Arguments& arguments) {
   });
 }
 
+void CheckSceneName(const std::string& option, const std::string& name) {
+  const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.'; };
+  if (name.empty() || name.size() > 63 || !std::all_of(name.begin(), name.end(), is_plain) || name[0] == '.') {
+    throw InputError(option + " '" + name + "'; valid: up to 63 letters, digits, '-', '_' and '.'");
+  }
+}
+
 void MakeNew(const Arguments& arguments) {
   if (arguments.from.empty() || !arguments.plain.empty()) {
     throw InputError("--new NAME needs --from MESH and nothing else; see --help");
   }
   const std::string& name = arguments.new_name;
-  const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.'; };
-  if (name.empty() || name.size() > 63 || !std::all_of(name.begin(), name.end(), is_plain) || name[0] == '.') {
-    throw InputError("--new '" + name + "'; valid: up to 63 letters, digits, '-', '_' and '.'");
-  }
+  CheckSceneName("--new", name);
   const fs::path yaml = arguments.out.empty() ? name + ".yaml" : arguments.out;
-  if (fs::exists(yaml)) {
-    throw InputError(yaml.string() + " is there already; remove it, or give another name or --out");
+  const fs::path picture = fs::path(yaml).replace_extension(".png");
+  if (yaml.extension() != ".yaml") throw InputError("--out " + yaml.string() + "; valid: a name that ends in .yaml");
+  for (const fs::path& file : {yaml, picture}) {
+    if (fs::exists(file)) {
+      throw InputError(file.string() + " is there already; remove it, or give another name or --out");
+    }
   }
   const Stages stages(arguments.quiet);
   const Limit limit(arguments.limit_s);
@@ -178,11 +196,17 @@ void MakeNew(const Arguments& arguments) {
   wanted.unit = arguments.unit;
   wanted.at_mm = PointOf("--at", arguments.at_mm);
   wanted.facing = PointOf("--facing", arguments.facing);
+  if (wanted.facing && !(wanted.facing->norm() > 0)) throw InputError("--facing must be a direction, not zero");
   ShowingFaults(fs::path(yaml).replace_extension(".fault.png"), [&] {
     WriteFile(yaml, scene::DescribeNewScene(wanted, stages.progress()));
+    scene::CompiledScene compiled;
+    try {
+      compiled = scene::CompileScene(yaml, {}, stages.progress());
+    } catch (...) {  // Else the corrected command would find it there already.
+      fs::remove(yaml);
+      throw;
+    }
     stages.Say("wrote " + yaml.string());
-    const scene::CompiledScene compiled = scene::CompileScene(yaml, {}, stages.progress());
-    const fs::path picture = fs::path(yaml).replace_extension(".png");
     Preview(compiled.data.View(), picture);
     stages.Say("drew " + picture.string());
     if (!arguments.quiet) {
@@ -204,7 +228,8 @@ void ImportLabels(const Arguments& arguments) {
   if (arguments.out.empty()) throw InputError("--anatomy needs --out DIR; see --help");
   const fs::path out = arguments.out;
   const std::string name = (out.has_filename() ? out : out.parent_path()).filename().string();
-  ShowingFaults("organ.fault.png", [&] {
+  CheckSceneName("--out", name);
+  ShowingFaults(name + ".fault.png", [&] {
     (void)scene::ImportAnatomyFiles({name, arguments.anatomy, arguments.map, out}, stages.progress());
   });
   if (!arguments.quiet) {

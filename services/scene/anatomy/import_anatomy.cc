@@ -1,6 +1,7 @@
 #include "services/scene/anatomy/import_anatomy.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -28,7 +29,7 @@ using config::Range;
 using config::StrictMap;
 using config::StrictYaml;
 
-constexpr int kMostLabels = 64;
+constexpr int kMostLabels = 1 + kMostSurroundings;
 /// Triangles of an organ's file: more than the scene embeds.
 constexpr int kOrganTriangles = 40000;
 constexpr std::size_t kLeastVoxels = 30;  ///< Fewer are noise of a segmentation.
@@ -77,9 +78,9 @@ int PiecesOf(const TriangleMesh& mesh) {
   for (const Triangle& t : mesh.triangles) {
     for (std::size_t k = 1; k < 3; ++k) parent[root(t[k])] = root(t[0]);
   }
-  int pieces = 0;
-  for (Index v = 0; v < parent.size(); ++v) pieces += parent[v] == v ? 1 : 0;
-  return pieces;
+  std::set<Index> roots;
+  for (const Triangle& t : mesh.triangles) roots.insert(root(t[0]));
+  return static_cast<int>(roots.size());
 }
 
 template <class... Values>
@@ -111,7 +112,10 @@ std::string Page(const AnatomyImport& import, const LabelMap& map, const std::ve
     page += Text("<td>%d<td>%zu", r.pieces, r.triangles);
   }
   page += "</table><p>";
-  if (has_voxels) page += "Surfaces stay within a voxel of the boundary of the voxels. ";
+  if (has_voxels)
+    page +=
+        "Before their triangles are reduced to triangles_max, surfaces stay within a voxel of the "
+        "boundary of the voxels. ";
   return page + "Of an organ in several pieces only the largest is used.</p><p><img src=\"" + EscapeHtml(import.name) +
          ".png\" width=1280></p>";
 }
@@ -258,7 +262,6 @@ std::string SuggestLabelUses(const fs::path& labels) {
     throw InputError(labels.string() + (is_folder ? ": holds no surface (.stl, .obj, .off, .ply, .vtk, .vtp)"
                                                   : ": every voxel is 0, so nothing is labelled"));
   }
-  if (entries.size() > kMostLabels) entries.resize(kMostLabels);
   const auto largest =
       std::max_element(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.size < b.size; });
   std::string text =
@@ -270,8 +273,18 @@ std::string SuggestLabelUses(const fs::path& labels) {
         "axes: LPS   # where x, y and z of the files lead in the patient: LPS (3D Slicer, most others), RAS, LSA ...\n"
         "unit: mm\n";
   text += "labels:\n";
-  for (const Entry& entry : entries) {
-    text += "  - {" + entry.source + ", name: " + entry.name +
+  // The larger ones, as many as a scene has room for; the others as comments.
+  std::vector<double> sizes;
+  for (const Entry& entry : entries) sizes.push_back(entry.size);
+  std::sort(sizes.rbegin(), sizes.rend());
+  const double least = sizes[std::min<std::size_t>(sizes.size(), kMostLabels) - 1];
+  int listed = 0;
+  std::set<std::string> names;
+  for (Entry& entry : entries) {
+    while (!names.insert(entry.name).second) entry.name = entry.name.substr(0, 29) + "_2";
+    const bool fits = entry.size >= least && listed < kMostLabels;
+    listed += fits ? 1 : 0;
+    text += std::string(fits ? "  - {" : "  # - {") + entry.source + ", name: " + entry.name +
             (&entry == &*largest ? ", organ: true" : ", role: other") + Text("}   # %.6g %s\n", entry.size, entry.unit);
   }
   return text;
@@ -281,6 +294,10 @@ std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const P
   const auto say = [&](const std::string& text) {
     if (progress) progress(text);
   };
+  std::error_code error;
+  if (fs::exists(import.out, error) && !(fs::is_directory(import.out, error) && fs::is_empty(import.out, error))) {
+    throw InputError(import.out.string() + " is there already and not empty; give another folder, or remove it");
+  }
   const LabelUses read = ReadLabelUses(import.map);
   const std::vector<LabelUse>& uses = read.uses;
   const bool has_voxels = uses[0].label > 0;
@@ -288,7 +305,6 @@ std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const P
   std::map<int, std::size_t> counts;
   std::map<std::string, TriangleMesh> surfaces =
       has_voxels ? SurfacesOfLabels(import, uses, say, &map, &counts) : SurfacesOfFiles(import, read, say);
-  std::error_code error;
   fs::create_directories(import.out, error);
   if (error) throw InputError(import.out.string() + ": cannot be made (" + error.message() + ")");
 
@@ -301,8 +317,8 @@ std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const P
     TriangleMesh& surface = surfaces.at(use.name);
     LabelReport report{use, has_voxels ? counts.at(use.label) : 0, 0, PiecesOf(surface), 0, 0};
     report.voxel_volume_ml = static_cast<double>(report.voxels) * voxel_ml;
-    report.volume_ml = 1e-3 * VolumeOf(surface);
     surface = Decimate(surface, use.is_organ ? kOrganTriangles : use.triangles_max);
+    report.volume_ml = 1e-3 * VolumeOf(surface);
     report.triangles = surface.triangles.size();
     const std::string file = use.name + ".ply";
     WriteText(import.out / file, Ply(surface));

@@ -19,7 +19,7 @@ struct LabelUse {
   bool is_organ = false;  ///< Deformable, under the membrane: one of all. The others are fixed surroundings.
   SurfaceRole role = SurfaceRole::kOther;
   bool collides = true;
-  int triangles_max = 4000;
+  int triangles_max = 10000;
 };
 
 struct LabelUses {
@@ -39,7 +39,7 @@ struct LabelReport {
   LabelUse use;
   std::size_t voxels = 0, triangles = 0;
   int pieces = 0;                             ///< Separate parts of the surface.
-  double voxel_volume_ml = 0, volume_ml = 0;  ///< Of the voxels, of the surface.
+  double voxel_volume_ml = 0, volume_ml = 0;  ///< Of the voxels, of the mesh as written.
 };
 
 struct AnatomyImport {
@@ -49,8 +49,8 @@ struct AnatomyImport {
   std::filesystem::path out;  ///< Folder to be made.
 };
 
-/// Writes NAME.yaml, a mesh per label (PLY, millimetres, axes of frame W: left, cranial, anterior), report.html and
-/// NAME.png. Throws InputError.
+/// Into a new or empty folder: NAME.yaml, a mesh per label (PLY, millimetres, axes of frame W: left, cranial,
+/// anterior), report.html and NAME.png. Throws InputError.
 std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const Progress& progress);
 
 }  // namespace fulcrum::scene

@@ -3,6 +3,7 @@
 #include <nifti2_io.h>
 
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <string>
 
@@ -22,28 +23,32 @@ using Image = std::unique_ptr<nifti_image, FreeImage>;
   throw InputError(file.string() + ": " + reason);
 }
 
-/// From voxel indices to the axes right, anterior, superior of NIfTI, in the file's unit.
-Eigen::Matrix4d ToRas(const std::filesystem::path& file, const nifti_image& image) {
+/// From voxel indices to the axes right, anterior, superior of NIfTI [mm].
+Eigen::Matrix4d ToRas(const std::filesystem::path& file, const nifti_image& image, double to_mm) {
   if (image.sform_code <= 0 && image.qform_code <= 0) {
     Refuse(file, "has neither sform nor qform, so left and right are not known; write the file with its orientation");
   }
   const nifti_dmat44& m = image.sform_code > 0 ? image.sto_xyz : image.qto_xyz;
   Eigen::Matrix4d ras = Eigen::Matrix4d::Identity();
   for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 4; ++c) ras(r, c) = m.m[r][c];
+    for (int c = 0; c < 4; ++c) ras(r, c) = to_mm * m.m[r][c];
   }
   const double volume = std::abs(ras.block<3, 3>(0, 0).determinant());
   if (!ras.allFinite() || !(volume > 1e-6 && volume < 1e6)) {
-    Refuse(file, "its voxels have a volume of " + std::to_string(volume) + "; valid: 1e-6 to 1e6 cubic millimetres");
+    char text[96];
+    std::snprintf(text, sizeof(text), "its voxels have a volume of %.3g cubic millimetres; valid: 1e-6 to 1e6", volume);
+    Refuse(file, text);
   }
   return ras;
 }
 
 template <class T>
-void Take(const std::filesystem::path& file, const nifti_image& image, double slope, LabelMap* map) {
+void Take(const std::filesystem::path& file, const nifti_image& image, LabelMap* map) {
+  // A slope of 0 means that nothing is scaled.
+  const double slope = image.scl_slope == 0 ? 1 : image.scl_slope, offset = image.scl_slope == 0 ? 0 : image.scl_inter;
   const T* values = static_cast<const T*>(image.data);
   for (std::size_t i = 0; i < map->labels.size(); ++i) {
-    const double value = slope * static_cast<double>(values[i]) + (slope == 1 ? 0 : image.scl_inter);
+    const double value = slope * static_cast<double>(values[i]) + offset;
     if (!(value >= 0 && value <= kMostLabel) || value != std::floor(value)) {
       Refuse(file,
              "voxel " + std::to_string(i) + " is " + std::to_string(value) +
@@ -81,47 +86,46 @@ LabelMap ReadLabelMap(const std::filesystem::path& file) {
   if (image->xyz_units == NIFTI_UNITS_MICRON) to_mm = 1e-3;
   // Right, anterior, superior become left, cranial, anterior: a rotation, so left stays left.
   Eigen::Matrix4d W_from_ras = Eigen::Matrix4d::Zero();
-  W_from_ras(0, 0) = -to_mm;
-  W_from_ras(1, 2) = to_mm;
-  W_from_ras(2, 1) = to_mm;
+  W_from_ras(0, 0) = -1;
+  W_from_ras(1, 2) = 1;
+  W_from_ras(2, 1) = 1;
   W_from_ras(3, 3) = 1;
-  map.W_from_index.matrix() = W_from_ras * ToRas(file, *image);
+  map.W_from_index.matrix() = W_from_ras * ToRas(file, *image, to_mm);
 
   if (nifti_image_load(image.get()) != 0 || image->data == nullptr) {
     Refuse(file, "its voxels cannot be read: the file is cut short");
   }
   map.labels.resize(voxels);
-  const double slope = image->scl_slope == 0 ? 1 : image->scl_slope;
   switch (image->datatype) {
     case DT_UINT8:
-      Take<std::uint8_t>(file, *image, slope, &map);
+      Take<std::uint8_t>(file, *image, &map);
       break;
     case DT_INT8:
-      Take<std::int8_t>(file, *image, slope, &map);
+      Take<std::int8_t>(file, *image, &map);
       break;
     case DT_UINT16:
-      Take<std::uint16_t>(file, *image, slope, &map);
+      Take<std::uint16_t>(file, *image, &map);
       break;
     case DT_INT16:
-      Take<std::int16_t>(file, *image, slope, &map);
+      Take<std::int16_t>(file, *image, &map);
       break;
     case DT_UINT32:
-      Take<std::uint32_t>(file, *image, slope, &map);
+      Take<std::uint32_t>(file, *image, &map);
       break;
     case DT_INT32:
-      Take<std::int32_t>(file, *image, slope, &map);
+      Take<std::int32_t>(file, *image, &map);
       break;
     case DT_UINT64:
-      Take<std::uint64_t>(file, *image, slope, &map);
+      Take<std::uint64_t>(file, *image, &map);
       break;
     case DT_INT64:
-      Take<std::int64_t>(file, *image, slope, &map);
+      Take<std::int64_t>(file, *image, &map);
       break;
     case DT_FLOAT32:
-      Take<float>(file, *image, slope, &map);
+      Take<float>(file, *image, &map);
       break;
     case DT_FLOAT64:
-      Take<double>(file, *image, slope, &map);
+      Take<double>(file, *image, &map);
       break;
     default:
       Refuse(file, "has values of type " + std::to_string(image->datatype) + "; valid: whole or real numbers");

@@ -32,6 +32,8 @@ struct TubeSettings {
   BrickSplit split = BrickSplit::kSix;
 };
 
+inline constexpr int kMostSurroundings = 16;  ///< Of an imported organ.
+
 /// The organ read from a mesh: its tetrahedra unchanged, or a surface that is filled with tetrahedra (without `wall_m`
 /// wall and lumen are one body). The membrane covers a stretch of the organ's centre line, on the side from which it is
 /// dissected, or a patch of its surface. Without `centreline_m` the importer finds line or patch, and the middle of the

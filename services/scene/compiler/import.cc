@@ -1,5 +1,6 @@
 #include "services/scene/compiler/import.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -39,7 +40,7 @@ void Place(const Placement& placement, Mesh* mesh) {
 }
 
 void CheckSize(const MeshFile& file, const ImportSettings& import, const std::string& name) {
-  const double size = LongestSide(file.vertices);
+  const double size = LongestSide(file);
   if (size >= kSmallestOrgan_m && size <= kLargestOrgan_m) return;
   std::string advice = "give its `unit` or a `scale`";
   for (const auto& [unit, scale_m] : {std::pair{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}, {"um", 1e-6}}) {
@@ -106,6 +107,25 @@ Organ TakeTetrahedra(const MeshFile& file, const ImportSettings& import, const s
   return organ;
 }
 
+/// Refuses what has no inside: an open sheet under caps, two coincident sheets.
+void CheckVolume(const TriangleMesh& surface, const std::string& name) {
+  // A ball has 0.094, a plate of 100 x 100 x 1 mm 0.0034.
+  constexpr double kLeast = 0.0025;
+  double volume = 0, area = 0;
+  const Vec3d& o = surface.vertices[0];
+  for (const Triangle& t : surface.triangles) {
+    const Vec3d &a = surface.vertices[t[0]], &b = surface.vertices[t[1]], &c = surface.vertices[t[2]];
+    volume += (a - o).dot((b - o).cross(c - o)) / 6;
+    area += (b - a).cross(c - a).norm() / 2;
+  }
+  if (volume > kLeast * std::pow(area, 1.5)) return;
+  char text[160];
+  std::snprintf(text, sizeof(text),
+                ": it encloses %.3g ml within %.3g square centimetres, which is a sheet and no organ", 1e6 * volume,
+                1e4 * area);
+  throw SpotError(name + text, {{surface}, surface.vertices[0]});
+}
+
 /// Fills the surface, or a wrap around it where triangles cross or the mesher fails.
 TetrahedralMesh Fill(const TriangleMesh& surface, const RepairReport& report, int target, const std::string& name,
                      const Progress& progress) {
@@ -117,7 +137,8 @@ TetrahedralMesh Fill(const TriangleMesh& surface, const RepairReport& report, in
       Say(progress, "not filled (%.120s)", error.what());
     }
   }
-  const TriangleMesh wrap = WrapSurface(surface);
+  std::size_t dropped = 0;
+  const TriangleMesh wrap = WrapSurface(surface, &dropped);
   Say(progress, "wrapped in %zu triangles to be filled", wrap.triangles.size());
   return Tetrahedralise(wrap, target, name);
 }
@@ -133,6 +154,7 @@ Organ FillSurface(const TriangleMesh& read, const ImportSettings& import, const 
       "least edge %.2f mm, least angle %.1f deg",
       report.openings_capped, report.edges_collapsed, report.caps_flipped, report.pieces_dropped,
       report.self_intersections, report.is_wrapped ? ", wrapped" : "", 1e3 * report.least_edge, report.least_angle_deg);
+  CheckVolume(organ.surface, name);
   const int target = import.tet_edge_m > 0 ? TetsOfEdge(organ.surface, import.tet_edge_m) : import.target_tets;
   if (target < kLeastTets || target > kMostTets) {
     throw InputError(name + ": tet_edge_mm = " + std::to_string(1e3 * import.tet_edge_m) + " gives about " +
@@ -245,7 +267,9 @@ Found FindMembrane(const SceneSettings& settings, const TriangleMesh& coarse, co
 }  // namespace
 
 Anatomy ImportAnatomy(const SceneSettings& settings, const Progress& progress) {
-  const ImportSettings& import = *settings.import;
+  ImportSettings import = *settings.import;
+  // The membrane's middle will be the origin, and `patch_at_m` is in the frame of the files.
+  if (import.centreline_m.empty()) import.origin_m.setZero();
   Organ body = ReadOrgan(import, import.organ_file.string(), progress);
   // Draped over the surface of the tetrahedra, to which the bindings are attached.
   TriangleMesh coarse{body.tets.vertices, BoundaryOf(body.tets.tets)};

@@ -288,28 +288,34 @@ constexpr double kMainPiece = 0.7;
 
 TriangleMesh Wrapped(const TriangleMesh& mesh, RepairReport* report) {
   report->is_wrapped = true;
-  TriangleMesh wrap = WrapSurface(mesh);
+  TriangleMesh wrap = WrapSurface(mesh, &report->pieces_dropped);
   MeasureShape(wrap, report);
   return wrap;
 }
 
 }  // namespace
 
-TriangleMesh WrapSurface(const TriangleMesh& mesh) {
+TriangleMesh WrapSurface(const TriangleMesh& mesh, std::size_t* pieces_dropped) {
   // Details and openings smaller than this share of the box's diagonal disappear, and the wrap lies outside by a
   // twentieth of that.
   constexpr double kShare = 1.0 / 80, kOffsetShare = 0.05;
-  Vec3d low = mesh.vertices[0], high = low;
-  std::vector<Kernel::Point_3> points;
-  for (const Vec3d& p : mesh.vertices) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-    points.emplace_back(p.x(), p.y(), p.z());
+  Vec3d low = Vec3d::Constant(1e300), high = -low;
+  double area = 0;
+  for (const Triangle& t : mesh.triangles) {
+    for (const Index v : t) {
+      low = low.cwiseMin(mesh.vertices[v]);
+      high = high.cwiseMax(mesh.vertices[v]);
+    }
+    const Vec3d& a = mesh.vertices[t[0]];
+    area += (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a).norm();
   }
+  if (!(area > 0)) throw InputError("no triangle has an area");
+  std::vector<Kernel::Point_3> points;
+  for (const Vec3d& p : mesh.vertices) points.emplace_back(p.x(), p.y(), p.z());
   const double alpha = kShare * (high - low).norm();
   Surface wrap;
   CGAL::alpha_wrap_3(points, mesh.triangles, alpha, kOffsetShare * alpha, wrap);
-  pmp::keep_largest_connected_components(wrap, 1);
+  *pieces_dropped = pmp::keep_largest_connected_components(wrap, 1);
   return ToMesh(&wrap);
 }
 
@@ -321,11 +327,12 @@ TriangleMesh RepairSurface(const TriangleMesh& mesh, const SurfaceRepair& settin
   }
   Thin(&surface);
   const double whole = pmp::area(surface);
+  Surface all = surface;
   report->pieces_dropped = pmp::keep_largest_connected_components(surface, 1);
   surface.collect_garbage();
   // Parts that overlap or triangles that do not meet are one body only when they are wrapped.
   const bool is_piecemeal = pmp::area(surface) < kMainPiece * whole;
-  if (is_piecemeal && !(settings.wall > 0)) return Wrapped(mesh, report);
+  if (is_piecemeal && !(settings.wall > 0)) return Wrapped(ToMesh(&all), report);
   if (settings.cap_openings) {
     report->openings_capped = CapOpenings(&surface);
   }

@@ -25,7 +25,7 @@ struct RepairReport {
   std::size_t pieces_dropped = 0;  ///< Separate pieces other than the largest.
   std::size_t edges_collapsed = 0;
   std::size_t caps_flipped = 0;  ///< Flat triangles removed by flipping their longest edge.
-  /// Remaining pairs of intersecting triangles: tolerated by the mesher, reported.
+  /// Remaining pairs of intersecting triangles: inside a wrap they are filled.
   std::size_t self_intersections = 0;
   double least_edge = 0, least_angle_deg = 0;  ///< After the repair.
   bool is_wrapped = false;                     ///< The result is a wrap (WrapSurface).
@@ -39,8 +39,9 @@ TriangleMesh RepairSurface(const TriangleMesh& mesh, const SurfaceRepair& settin
                            RepairReport* report);
 
 /// The closed surface around all triangles, free of crossings, whatever their faults: an alpha wrap (Portaneri et al.
-/// 2022). Details below an eightieth of the size disappear.
-TriangleMesh WrapSurface(const TriangleMesh& mesh);
+/// 2022). Details below an eightieth of the size disappear; of separate wraps the largest remains. Throws InputError if
+/// no triangle has an area.
+TriangleMesh WrapSurface(const TriangleMesh& mesh, std::size_t* pieces_dropped);
 
 /// Edge collapse (Lindstrom, Turk 1998) down to `triangles_max`; pieces and holes remain. Orientation is made
 /// consistent.

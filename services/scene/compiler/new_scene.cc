@@ -27,7 +27,7 @@ std::string Text(const char* format, Values... values) {
 /// The unit in which the organ is of a size that organs have.
 std::string LikelyUnit(const MeshFile& file, const std::string& name) {
   constexpr double kSmall_m = 0.02, kLarge_m = 0.6;
-  const double size = LongestSide(file.vertices);
+  const double size = LongestSide(file);
   for (const auto& [unit, scale_m] : {std::pair{"mm", 1e-3}, {"m", 1.0}, {"cm", 1e-2}, {"um", 1e-6}}) {
     if (size * scale_m >= kSmall_m && size * scale_m <= kLarge_m) return unit;
   }
@@ -108,11 +108,11 @@ Vec3d Trocar(const Vec3d& wanted, const Vec3d& target, const Room& wants, const 
   double most = -1;
   for (int b = 0; b < kBearings; ++b) {
     // 0, 1, -1, 2, -2 ... turns.
-    const double turned = bearing + kTurn_rad * ((b + 1) / 2) * (b % 2 != 0 ? 1 : -1);
+    const int turns = (b + 1) / 2 * (b % 2 != 0 ? 1 : -1);
+    const double turned = bearing + kTurn_rad * turns;
     for (int e = 0; e < kSteeper; ++e) {
       const double up = std::min(elevation + kStep_rad * e, 1.4);
-      const Vec3d trocar =
-          distance * Vec3d(std::cos(up) * std::cos(turned), std::cos(up) * std::sin(turned), std::sin(up));
+      Vec3d trocar = distance * Vec3d(std::cos(up) * std::cos(turned), std::cos(up) * std::sin(turned), std::sin(up));
       const double room = Clearance(obstacles, trocar, target, wants);
       if (room >= wants.radius) return trocar;
       if (room > most) {
@@ -182,10 +182,21 @@ void ChooseSide(NewScene* scene, ImportSettings* import, const Take& take, Anato
 
 std::string TextOf(const Vec3d& p_mm) { return Text("[%.4g, %.4g, %.4g]", p_mm.x(), p_mm.y(), p_mm.z()); }
 
+/// A scalar of YAML with any characters but those of control.
+std::string Quoted(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (static_cast<unsigned char>(c) < 0x20) continue;
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += c;
+  }
+  return quoted + "\"";
+}
+
 std::string OrganText(const NewScene& scene, const ImportSettings& import, bool is_patch) {
-  std::string text = "organ:\n  import:\n    organ: \"" + scene.mesh_text + "\"\n    unit: " + scene.unit + "\n";
+  std::string text = "organ:\n  import:\n    organ: " + Quoted(scene.mesh_text) + "\n    unit: " + scene.unit + "\n";
   if (import.cap_openings) text += "    cap_openings: true         # or wall_mm: 3, for a hollow organ\n";
-  if (scene.facing) text += "    facing: " + TextOf(*scene.facing) + "\n";
+  if (scene.facing) text += "    facing: " + TextOf(scene.facing->normalized()) + "\n";
   if (scene.at_mm) {
     text += "    patch: {at_mm: " + TextOf(*scene.at_mm) + "}   # further keys: width_mm, length_mm\n";
   } else if (!is_patch) {
@@ -258,7 +269,10 @@ std::string DescribeNewScene(const NewScene& given, const Progress& progress) {
   MeshFile file = ReadMesh(scene.mesh);
   if (scene.unit.empty()) {
     scene.unit = LikelyUnit(file, scene.mesh.string());
-    if (progress) progress("unit: " + scene.unit);
+    if (progress) {
+      progress(Text("unit: %s, so that the organ is %.0f mm long; --unit says otherwise", scene.unit.c_str(),
+                    1e3 * LengthUnit(scene.unit) * LongestSide(file)));
+    }
   }
   SceneSettings settings;
   ImportSettings& import = settings.import.emplace();
@@ -295,13 +309,12 @@ std::string DescribeNewScene(const NewScene& given, const Progress& progress) {
   const Vec3d grasper = 1e3 * Trocar(Vec3d(-0.085, -0.045, 0.092), Vec3d(-0.01, 0, 0), kShaft, obstacles);
   const Vec3d hook = 1e3 * Trocar(Vec3d(0.098, 0, 0.034), Vec3d(0.003, 0, 0), kShaft, obstacles);
   const MembraneSettings& m = settings.membrane;
-  std::string text = "# " +
-                     Text("Made from %s: a membrane of %.0f x %.0f mm.", scene.mesh.filename().c_str(),
-                          1e3 * size.width, 1e3 * size.length) +
+  std::string text = "# " + Text("A membrane of %.0f x %.0f mm over ", 1e3 * size.width, 1e3 * size.length) +
+                     Quoted(scene.mesh.filename().string()) + "." +
                      "\n# The membrane's middle is the origin of the scene, z leads away from the organ, y along it. "
                      "Every key: services/scene/README.md.\n" +
-                     "name: \"" + scene.name + "\"\n" + "description: \"Organ from " + scene.mesh.filename().string() +
-                     "\"\n\n";
+                     "name: \"" + scene.name + "\"\n" +
+                     "description: " + Quoted("Organ from " + scene.mesh.filename().string()) + "\n\n";
   text += OrganText(scene, import, anatomy.is_patch) + "\n";
   text += Text(
       "membrane:\n  rows: %d\n  cols: %d\n  gap_mm: %.1f                  # fat between membrane and organ\n"

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <queue>
 
@@ -18,7 +19,7 @@ constexpr int kLineSmoothing = 3;       ///< Each moves a point half way to the 
 constexpr double kLeastElongation = 2;  ///< Length over mean diameter: a shorter body is no tube.
 /// Share of the body's silhouette, either way, that a patch covers: the corners of a larger one leave a round body.
 constexpr double kPatchShare = 0.65;
-constexpr double kLeastPatch_m = 0.012, kLargestPatch_m = 0.25;
+constexpr double kLeastPatch_m = 0.005, kLargestPatch_m = 0.25;
 /// The normal of a patch is the mean over this share of the body's size.
 constexpr double kNormalReach = 0.12;
 
@@ -58,8 +59,12 @@ std::vector<double> DistancesFrom(const Graph& graph, Index start) {
 
 Index FarthestOf(const std::vector<double>& distance) {
   Index farthest = 0;
+  double most = -1;
   for (Index v = 0; v < distance.size(); ++v) {
-    if (std::isfinite(distance[v]) && !(distance[v] <= distance[farthest])) farthest = v;
+    if (std::isfinite(distance[v]) && distance[v] > most) {
+      farthest = v;
+      most = distance[v];
+    }
   }
   return farthest;
 }
@@ -277,6 +282,17 @@ double LongestSide(const std::vector<Vec3d>& points) {
     high = high.cwiseMax(p);
   }
   return points.empty() ? 0 : (high - low).maxCoeff();
+}
+
+double LongestSide(const MeshFile& file) {
+  std::vector<Vec3d> used;
+  for (const Triangle& t : file.triangles) {
+    for (const Index v : t) used.push_back(file.vertices[v]);
+  }
+  for (const Tetrahedron& t : file.tets) {
+    for (const Index v : t) used.push_back(file.vertices[v]);
+  }
+  return LongestSide(used);
 }
 
 std::vector<Vec3d> FindCentreLine(const TriangleMesh& surface) {

@@ -35,5 +35,7 @@ Placement PlacePatch(const TriangleMesh& surface, const ImportSettings& import);
 
 /// The longest side of the box around points [m].
 double LongestSide(const std::vector<Vec3d>& points);
+/// The same of the elements of a file, in its unit; vertices that none uses do not count.
+double LongestSide(const MeshFile& file);
 
 }  // namespace fulcrum::scene

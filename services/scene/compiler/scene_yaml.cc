@@ -145,7 +145,7 @@ void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Fol
   ReadSi(&map, "flare_mm", Range::Between(0, 60), &import->flare_m);
   ReadSi(&map, "bed_mm", Range::Between(0, 150), &import->bed_m);
   ReadSi(&map, "cavity_mm", Range::Between(0, 1000), &import->cavity_m);
-  for (StrictMap& entry : map.Maps("surroundings", 0, 16)) {
+  for (StrictMap& entry : map.Maps("surroundings", 0, kMostSurroundings)) {
     ImportSettings::Surrounding s;
     s.name = entry.Text("name", 31);
     s.role = entry.Choice("role", s.role, kRoles);

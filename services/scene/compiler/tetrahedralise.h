@@ -9,7 +9,8 @@
 namespace fulcrum::scene {
 
 /// Delaunay refinement with sliver removal (CGAL Mesh_3), its cell size adjusted until the count is within 10 % of
-/// `target_tets`. The same input gives the same mesh. Throws InputError "name: reason".
+/// `target_tets`, or the nearest attempt if it has 0.6 to 1.67 times as many. The same input gives the same mesh.
+/// Throws InputError "name: reason".
 TetrahedralMesh Tetrahedralise(const TriangleMesh& surface, int target_tets, const std::string& name);
 
 /// Approximate number of tetrahedra of this mean edge that fill a closed surface.

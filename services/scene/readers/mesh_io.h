@@ -1,5 +1,5 @@
-// Reads meshes from files of other programs: Gmsh, VTK legacy, VTU, TetGen, STL, OBJ, PLY. Files are untrusted: sizes
-// are compared with the number of bytes in the file before memory is allocated.
+// Reads meshes from files of other programs: Gmsh, VTK legacy, VTU, TetGen, VTP, STL, OBJ, OFF, PLY. Files are
+// untrusted: sizes are compared with the number of bytes in the file before memory is allocated.
 #pragma once
 
 #include <filesystem>

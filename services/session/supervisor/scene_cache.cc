@@ -46,6 +46,14 @@ std::vector<std::string> PathWords(const std::string& yaml) {
       words.push_back(word);
     }
   }
+  // Quoted names may hold separators.
+  for (std::size_t begin = 0; (begin = yaml.find_first_of("\"'", begin)) != std::string::npos;) {
+    const std::size_t end = yaml.find_first_of(std::string{yaml[begin], '\n'}, begin + 1);
+    if (end != std::string::npos && yaml[end] == yaml[begin] && end - begin - 1 <= kLongestName) {
+      words.push_back(yaml.substr(begin + 1, end - begin - 1));
+    }
+    begin = std::min(end, yaml.size() - 1) + 1;
+  }
   return words;
 }
 

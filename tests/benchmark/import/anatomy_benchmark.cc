@@ -3,9 +3,11 @@
 #include "tests/benchmark/import/anatomy_benchmark.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <fstream>
+#include <thread>
 
 #include "services/base/runtime/child_process.h"
 #include "services/scene/builder/geometry.h"
@@ -80,7 +82,7 @@ void WriteUses(const fs::path& file, const std::vector<Part>& parts) {
   out << "labels:\n";
   for (const Part& part : parts) {
     out << "  - {label: " << part.label << ", name: " << part.name
-        << (part.is_organ ? ", organ: true" : ", role: other") << ", triangles_max: 20000}\n";
+        << (part.is_organ ? ", organ: true" : ", role: other") << "}\n";
   }
 }
 

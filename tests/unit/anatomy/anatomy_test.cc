@@ -174,9 +174,36 @@ TEST_F(Segmentation, WhatIsNoLabelMapIsRefused) {
   bad.srow_x[0] = 0;
   EXPECT_NE(refusal(fulcrum::testing::NiftiBytes(map, bad)).find("voxels have a volume"), std::string::npos);
   bad = header;
+  bad.scl_slope = 1;
+  bad.scl_inter = -1024;
+  EXPECT_NE(refusal(fulcrum::testing::NiftiBytes(map, bad)).find("whole numbers 0 to 65535"), std::string::npos);
+  bad = header;
   bad.dim[1] = 30000;
   EXPECT_NE(refusal(fulcrum::testing::NiftiBytes(map, bad)).find("valid: 2 to 4096"), std::string::npos);
   EXPECT_NE(Refusal([&] { (void)ReadLabelMap(folder_ / "none.nii"); }).find("is no file"), std::string::npos);
+}
+
+TEST_F(Segmentation, MetresAndMicrometresAreRead) {
+  const LabelMap map = Fill({6, 6, 6}, Eigen::Affine3d::Identity(), [](const Vec3d& p) { return p.x() > 2 ? 1 : 0; });
+  for (const auto& [unit, per_mm] : {std::pair{NIFTI_UNITS_METER, 1e-3}, {NIFTI_UNITS_MICRON, 1e3}}) {
+    Eigen::Affine3d ras = Eigen::Affine3d::Identity();
+    ras.linear() *= 1.5 * per_mm;
+    nifti_1_header header = fulcrum::testing::NiftiHeader(map, ras, false);
+    header.xyzt_units = static_cast<char>(unit);
+    const LabelMap read = ReadLabelMap(Write("x.nii", fulcrum::testing::NiftiBytes(map, header)));
+    EXPECT_NEAR(read.W_from_index.linear().col(0).norm(), 1.5, 1e-5);
+  }
+}
+
+TEST_F(Segmentation, MoreLabelsThanASceneHoldsAreSuggestedAsComments) {
+  const LabelMap map = Fill({40, 6, 6}, Eigen::Affine3d::Identity(), [](const Vec3d& p) { return p.x() + 1; });
+  const Eigen::Affine3d ras = Eigen::Affine3d::Identity();
+  const fs::path file =
+      Write("x.nii", fulcrum::testing::NiftiBytes(map, fulcrum::testing::NiftiHeader(map, ras, false)));
+  const std::string suggested = SuggestLabelUses(file);
+  std::ofstream(folder_ / "labels.yaml") << suggested;
+  EXPECT_EQ(ReadLabelUses(folder_ / "labels.yaml").uses.size(), 17u) << suggested;
+  EXPECT_NE(suggested.find("# - {label: "), std::string::npos);
 }
 
 TEST_F(Segmentation, AlteredBytesAreReadOrRefused) {
@@ -248,10 +275,11 @@ TEST_F(Segmentation, ASegmentationBecomesAScene) {
   EXPECT_FALSE(fault) << fault->section << ": " << fault->reason;
   EXPECT_EQ(std::string(data.View().static_surfaces.back().name), "bladder");
   std::ofstream(folder_ / "labels.yaml") << "labels:\n  - {label: 4, name: rectum, organ: true}\n";
-  EXPECT_NE(Refusal([&] {
-              (void)ImportAnatomyFiles({"patient", file, folder_ / "labels.yaml", folder_ / "patient"}, {});
-            }).find("label 4 (rectum) has 0 voxels"),
-            std::string::npos);
+  const auto again = [&](const char* out) {
+    return Refusal([&] { (void)ImportAnatomyFiles({"patient", file, folder_ / "labels.yaml", folder_ / out}, {}); });
+  };
+  EXPECT_NE(again("patient").find("is there already and not empty"), std::string::npos) << "edited files stay";
+  EXPECT_NE(again("other").find("label 4 (rectum) has 0 voxels"), std::string::npos);
 }
 
 TEST_F(Segmentation, AFolderOfSurfacesBecomesAScene) {
@@ -277,6 +305,7 @@ TEST_F(Segmentation, AFolderOfSurfacesBecomesAScene) {
   const fs::path out = folder_ / "patient";
   const AnatomyImport import{"patient", folder_ / "surfaces", folder_ / "labels.yaml", out};
   EXPECT_NE(Refusal([&] { (void)ImportAnatomyFiles(import, {}); }).find("with `unit: m`"), std::string::npos);
+  fs::remove_all(out);
   std::string metres = suggested;
   metres.replace(metres.find("unit: mm"), 8, "unit: m ");
   std::ofstream(folder_ / "labels.yaml") << metres;

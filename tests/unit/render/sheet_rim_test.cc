@@ -38,5 +38,21 @@ TEST(SheetRim, ASideWithoutRetroperitoneumEndsAsItIs) {
   EXPECT_TRUE(ends(SheetRim(data.View())));
 }
 
+TEST(SheetRim, SidesThatLieOnTheOrganAreFusedWithIt) {
+  scene::SceneSettings settings = scene::BuiltIn();
+  scene::SceneData data = scene::BuildProcedural(settings);
+  data.static_surfaces.clear();
+  const SceneView before = data.View();
+  EXPECT_TRUE(std::ranges::all_of(SheetRim(before), [](float value) { return value == 0; }));
+  // One side brought down to the organ.
+  const std::uint32_t rows = before.membrane.rows, cols = before.membrane.cols;
+  for (std::uint32_t row = 0; row < rows; ++row) {
+    data.rest_position[before.membrane.first + row * cols] = data.rest_position[before.tube_surface[row][0]];
+  }
+  const std::vector<float> rim = SheetRim(data.View());
+  EXPECT_FLOAT_EQ(rim[rows / 2 * cols], -1);
+  EXPECT_FLOAT_EQ(rim[rows / 2 * cols + cols - 1], 0);
+}
+
 }  // namespace
 }  // namespace fulcrum::render

@@ -159,6 +159,20 @@ TEST(Wrap, LeavesASoundSurfaceAlone) {
   EXPECT_FALSE(report.is_wrapped);
 }
 
+TEST(Wrap, OfTwoPartsKeepsOneAndSaysSo) {
+  TriangleMesh two = Ball({0, 0, 0}, 0.03);
+  const TriangleMesh other = Ball({0.09, 0, 0}, 0.03);
+  const auto shift = static_cast<Index>(two.vertices.size());
+  two.vertices.insert(two.vertices.end(), other.vertices.begin(), other.vertices.end());
+  for (const Triangle& t : other.triangles) two.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
+  RepairReport report;
+  (void)RepairSurface(two, {0.0003, false, 0}, "x", &report);
+  EXPECT_EQ(report.pieces_dropped, 1u);
+  std::size_t dropped = 0;
+  EXPECT_THROW((void)WrapSurface({{Vec3d(0, 0, 0), Vec3d(1, 0, 0), Vec3d(2, 0, 0)}, {{0, 1, 2}}}, &dropped),
+               InputError);
+}
+
 // ------------------------------------------------------------------------------------------------ whole scenes
 
 class Import : public testing::Test {
@@ -261,6 +275,32 @@ TEST_F(Import, APatchBesideTheOrganIsRefusedWithAPicture) {
   EXPECT_NE(Refusal("    organ: ball.obj\n    patch: {}\n    centreline: {x_mm: [0, 0], y_mm: [-9, 9], z_mm: [0, 0]}\n")
                 .find("exclude each other"),
             std::string::npos);
+}
+
+TEST_F(Import, WhatHasNoInsideIsRefused) {
+  TriangleMesh plane;
+  plane.vertices = {{0, 0, 0}, {0.05, 0, 0}, {0.05, 0.05, 0}, {0, 0.05, 0}};
+  plane.triangles = {{0, 1, 2}, {0, 2, 3}};
+  Write("plane.obj", plane, 1e3);
+  EXPECT_NE(Refusal("    organ: plane.obj\n    cap_openings: true\n").find("a sheet and no organ"), std::string::npos);
+  plane.triangles.insert(plane.triangles.end(), {{0, 2, 1}, {0, 3, 2}});
+  Write("plane.obj", plane, 1e3);
+  EXPECT_NE(Refusal("    organ: plane.obj\n    cap_openings: true\n"), "");
+  std::ofstream(folder_ / "line.obj") << "v 0 0 0\nv 30 0 0\nv 60 0 0\nf 1 2 3\n";
+  EXPECT_NE(Refusal("    organ: line.obj\n    cap_openings: true\n").find("no triangle"), std::string::npos);
+}
+
+TEST_F(Import, PatchIsInTheFrameOfTheFilesWhateverTheOrigin) {
+  Write("ball.obj", Ball({0.1, 0.2, 0.3}, 0.03), 1e3);
+  const std::string keys = "    organ: ball.obj\n    patch: {at_mm: [110, 200, 340]}\n";
+  EXPECT_EQ(Build(keys).fixed.hash, Build(keys + "    origin_mm: [40, -60, 20]\n").fixed.hash);
+}
+
+TEST_F(Import, VerticesThatNoTriangleUsesDoNotCount) {
+  TriangleMesh ball = Ball({1.4, 0, 0}, 0.03);
+  ball.vertices.emplace_back(0, 0, 0);
+  Write("ball.obj", ball, 1e3);
+  EXPECT_EQ(Refusal("    organ: ball.obj\n"), "");
 }
 
 TEST_F(Import, FaultyTetrahedraAreFilledAnew) {
