@@ -88,6 +88,7 @@ std::string Operate(const fs::path& mesh, const fs::path& folder) {
   constexpr float kFar_m = 0.06f;
   const fs::path yaml = folder / "new.yaml", compiled = folder / "new.fulcrum", log = folder / "new.log";
   fs::remove(yaml);
+  fs::remove(folder / "new.png");
   for (const auto& words : {std::vector<std::string>{"--new", "new", "--from", mesh.string(), "--out", yaml.string()},
                             std::vector<std::string>{yaml.string(), "--out", compiled.string()}}) {
     if (const Result result = Compile(words, log); !result.compiled) return result.last;
