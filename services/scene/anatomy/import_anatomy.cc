@@ -20,6 +20,7 @@
 #include "services/scene/compiler/new_scene.h"
 #include "services/scene/compiler/preview.h"
 #include "services/scene/compiler/scene_yaml.h"
+#include "services/scene/compiler/tetrahedralise.h"
 
 namespace fulcrum::scene {
 namespace {
@@ -57,15 +58,6 @@ std::string Ply(const TriangleMesh& mesh) {
     for (const Index v : t) put(static_cast<std::int32_t>(v));
   }
   return bytes;
-}
-
-double VolumeOf(const TriangleMesh& mesh) {
-  double volume = 0;
-  const Vec3d o = mesh.vertices[0];
-  for (const Triangle& t : mesh.triangles) {
-    volume += (mesh.vertices[t[0]] - o).dot((mesh.vertices[t[1]] - o).cross(mesh.vertices[t[2]] - o)) / 6;
-  }
-  return volume;
 }
 
 int PiecesOf(const TriangleMesh& mesh) {
@@ -318,7 +310,7 @@ std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const P
     LabelReport report{use, has_voxels ? counts.at(use.label) : 0, 0, PiecesOf(surface), 0, 0};
     report.voxel_volume_ml = static_cast<double>(report.voxels) * voxel_ml;
     surface = Decimate(surface, use.is_organ ? kOrganTriangles : use.triangles_max);
-    report.volume_ml = 1e-3 * VolumeOf(surface);
+    report.volume_ml = 1e-3 * EnclosedVolume(surface);
     report.triangles = surface.triangles.size();
     const std::string file = use.name + ".ply";
     WriteText(import.out / file, Ply(surface));

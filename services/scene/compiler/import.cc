@@ -11,6 +11,7 @@
 #include "services/scene/compiler/drape.h"
 #include "services/scene/compiler/mesh_repair.h"
 #include "services/scene/compiler/placement.h"
+#include "services/scene/compiler/scene_yaml.h"
 #include "services/scene/compiler/tet_repair.h"
 #include "services/scene/compiler/tetrahedralise.h"
 
@@ -43,8 +44,8 @@ void CheckSize(const MeshFile& file, const ImportSettings& import, const std::st
   const double size = LongestSide(file);
   if (size >= kSmallestOrgan_m && size <= kLargestOrgan_m) return;
   std::string advice = "give its `unit` or a `scale`";
-  for (const auto& [unit, scale_m] : {std::pair{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}, {"um", 1e-6}}) {
-    const double then = size / import.scale_m * scale_m;
+  for (const char* unit : {"m", "cm", "mm", "um"}) {
+    const double then = size / import.scale_m * LengthUnit(unit);
     if (then >= kSmallestOrgan_m && then <= kLargestOrgan_m) {
       char text[96];
       std::snprintf(text, sizeof(text), "with `unit: %s` it would be %.3g mm long", unit, 1e3 * then);
@@ -111,11 +112,10 @@ Organ TakeTetrahedra(const MeshFile& file, const ImportSettings& import, const s
 void CheckVolume(const TriangleMesh& surface, const std::string& name) {
   // A ball has 0.094, a plate of 100 x 100 x 1 mm 0.0034.
   constexpr double kLeast = 0.0025;
-  double volume = 0, area = 0;
-  const Vec3d& o = surface.vertices[0];
+  const double volume = EnclosedVolume(surface);
+  double area = 0;
   for (const Triangle& t : surface.triangles) {
     const Vec3d &a = surface.vertices[t[0]], &b = surface.vertices[t[1]], &c = surface.vertices[t[2]];
-    volume += (a - o).dot((b - o).cross(c - o)) / 6;
     area += (b - a).cross(c - a).norm() / 2;
   }
   if (volume > kLeast * std::pow(area, 1.5)) return;

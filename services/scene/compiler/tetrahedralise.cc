@@ -37,14 +37,6 @@ constexpr double kSliverBound_deg = 15;
 constexpr double kFacetDistance = 0.25;
 constexpr unsigned kSeed = 0;
 
-double VolumeOf(const TriangleMesh& surface) {
-  double volume = 0;
-  for (const Triangle& t : surface.triangles) {
-    volume += surface.vertices[t[0]].dot(surface.vertices[t[1]].cross(surface.vertices[t[2]])) / 6;
-  }
-  return volume;
-}
-
 TetrahedralMesh ToMesh(const Complex& complex) {
   TetrahedralMesh mesh;
   std::map<std::array<double, 3>, Index> ids;
@@ -88,8 +80,16 @@ const double kRegularVolume = 1 / (6 * std::numbers::sqrt2);
 
 }  // namespace
 
+double EnclosedVolume(const TriangleMesh& surface) {
+  double volume = 0;
+  for (const Triangle& t : surface.triangles) {
+    volume += surface.vertices[t[0]].dot(surface.vertices[t[1]].cross(surface.vertices[t[2]])) / 6;
+  }
+  return volume;
+}
+
 int TetsOfEdge(const TriangleMesh& surface, double edge) {
-  return static_cast<int>(std::min(VolumeOf(surface) / (kRegularVolume * edge * edge * edge), 1e9));
+  return static_cast<int>(std::min(EnclosedVolume(surface) / (kRegularVolume * edge * edge * edge), 1e9));
 }
 
 TetrahedralMesh Tetrahedralise(const TriangleMesh& mesh, int target_tets, const std::string& name) {
@@ -103,7 +103,7 @@ TetrahedralMesh Tetrahedralise(const TriangleMesh& mesh, int target_tets, const 
     surface.add_face(vertices[t[0]], vertices[t[1]], vertices[t[2]]);
   }
   // The criterion bounds circumradii, so the search begins above the edge of the regular tetrahedron.
-  double size = 1.1 * std::cbrt(VolumeOf(mesh) / (kRegularVolume * target_tets));
+  double size = 1.1 * std::cbrt(EnclosedVolume(mesh) / (kRegularVolume * target_tets));
   // count ~ size^-order: 3 in a thick body; in a wall of one layer the last two attempts determine it.
   double order = 3, last_size = 0;
   std::size_t last_count = 0;

@@ -13,6 +13,9 @@ namespace fulcrum::scene {
 /// Throws InputError "name: reason".
 TetrahedralMesh Tetrahedralise(const TriangleMesh& surface, int target_tets, const std::string& name);
 
+/// Volume inside a closed surface; its cube of length is that of the vertices.
+double EnclosedVolume(const TriangleMesh& surface);
+
 /// Approximate number of tetrahedra of this mean edge that fill a closed surface.
 int TetsOfEdge(const TriangleMesh& surface, double edge);
 

@@ -15,6 +15,7 @@
 #include "services/scene/compiler/placement.h"
 #include "services/scene/compiler/preview.h"
 #include "services/scene/compiler/scene_yaml.h"
+#include "services/scene/compiler/tetrahedralise.h"
 #include "services/scene/format/validate.h"
 
 namespace fulcrum::scene {
@@ -71,14 +72,6 @@ TriangleMesh Bow() {
     line.emplace_back(0.05 * std::cos(a), 0.05 * std::sin(a), 0.2);
   }
   return Rings(line, std::vector<double>(line.size(), 0.012));
-}
-
-double VolumeOf(const TriangleMesh& mesh) {
-  double volume = 0;
-  for (const Triangle& t : mesh.triangles) {
-    volume += mesh.vertices[t[0]].dot(mesh.vertices[t[1]].cross(mesh.vertices[t[2]])) / 6;
-  }
-  return volume;
 }
 
 // ------------------------------------------------------------------------------------------------------- where
@@ -150,7 +143,7 @@ TEST(Wrap, MakesOneBodyOfPartsThatCross) {
   EXPECT_TRUE(report.is_wrapped);
   // Two balls less the lens that they share.
   const double r = 0.03, ball = 4.0 / 3 * M_PI * r * r * r, lens = M_PI * (4 * r + r) * r * r / 12;
-  EXPECT_NEAR(VolumeOf(wrap), 2 * ball - lens, 0.05 * ball);
+  EXPECT_NEAR(EnclosedVolume(wrap), 2 * ball - lens, 0.05 * ball);
 }
 
 TEST(Wrap, LeavesASoundSurfaceAlone) {
