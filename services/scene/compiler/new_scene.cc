@@ -28,8 +28,8 @@ std::string Text(const char* format, Values... values) {
 std::string LikelyUnit(const MeshFile& file, const std::string& name) {
   constexpr double kSmall_m = 0.02, kLarge_m = 0.6;
   const double size = LongestSide(file);
-  for (const auto& [unit, scale_m] : {std::pair{"mm", 1e-3}, {"m", 1.0}, {"cm", 1e-2}, {"um", 1e-6}}) {
-    if (size * scale_m >= kSmall_m && size * scale_m <= kLarge_m) return unit;
+  for (const char* unit : {"mm", "m", "cm", "um"}) {
+    if (const double size_m = size * LengthUnit(unit); size_m >= kSmall_m && size_m <= kLarge_m) return unit;
   }
   throw InputError(name + ": its longest side is " + Text("%.4g", size) +
                    ", which is no organ in mm, cm, m or um; give --unit, and `scale` in the description");
@@ -266,8 +266,8 @@ std::string ScriptText(const SheetSize& size, const Vec3d& hook_wait_mm) {
 
 std::string DescribeNewScene(const NewScene& given, const Progress& progress) {
   NewScene scene = given;
-  MeshFile file = ReadMesh(scene.mesh);
   if (scene.unit.empty()) {
+    const MeshFile file = ReadMesh(scene.mesh);
     scene.unit = LikelyUnit(file, scene.mesh.string());
     if (progress) {
       progress(Text("unit: %s, so that the organ is %.0f mm long; --unit says otherwise", scene.unit.c_str(),
