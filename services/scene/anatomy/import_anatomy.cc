@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <functional>
 #include <map>
@@ -19,6 +18,7 @@
 #include "services/scene/compiler/mesh_repair.h"
 #include "services/scene/compiler/new_scene.h"
 #include "services/scene/compiler/preview.h"
+#include "services/scene/compiler/print_text.h"
 #include "services/scene/compiler/scene_yaml.h"
 #include "services/scene/compiler/tetrahedralise.h"
 
@@ -75,13 +75,6 @@ int PiecesOf(const TriangleMesh& mesh) {
   return static_cast<int>(roots.size());
 }
 
-template <class... Values>
-std::string Text(const char* format, Values... values) {
-  char text[512];
-  std::snprintf(text, sizeof(text), format, values...);
-  return text;
-}
-
 std::string Page(const AnatomyImport& import, const LabelMap& map, const std::vector<LabelReport>& reports) {
   const bool has_voxels = !map.labels.empty();
   const Mat3d axes = map.W_from_index.linear();
@@ -90,18 +83,18 @@ std::string Page(const AnatomyImport& import, const LabelMap& map, const std::ve
                      ".8em;text-align:right}td:first-child,th:first-child{text-align:left}</style><h1>" +
                      EscapeHtml(import.name) + "</h1><p>From " + EscapeHtml(import.labels.filename().string());
   if (has_voxels) {
-    page += Text(": %d × %d × %d voxels of %.2f × %.2f × %.2f mm", map.size[0], map.size[1], map.size[2],
-                 axes.col(0).norm(), axes.col(1).norm(), axes.col(2).norm());
+    page += PrintText(": %d × %d × %d voxels of %.2f × %.2f × %.2f mm", map.size[0], map.size[1], map.size[2],
+                      axes.col(0).norm(), axes.col(1).norm(), axes.col(2).norm());
   }
   page += ".</p><table><tr><th>organ";
   page += has_voxels ? "<th>label<th>voxels<th>ml of voxels<th>ml of mesh<th>difference" : "<th>ml of mesh";
   page += "<th>pieces<th>triangles";
   for (const LabelReport& r : reports) {
     page += "<tr><td>" + EscapeHtml(r.use.name) + (r.use.is_organ ? " (deformable)" : "");
-    page += has_voxels ? Text("<td>%d<td>%zu<td>%.2f<td>%.2f<td>%+.1f %%", r.use.label, r.voxels, r.voxel_volume_ml,
-                              r.volume_ml, 100 * (r.volume_ml / r.voxel_volume_ml - 1))
-                       : Text("<td>%.2f", r.volume_ml);
-    page += Text("<td>%d<td>%zu", r.pieces, r.triangles);
+    page += has_voxels ? PrintText("<td>%d<td>%zu<td>%.2f<td>%.2f<td>%+.1f %%", r.use.label, r.voxels,
+                                   r.voxel_volume_ml, r.volume_ml, 100 * (r.volume_ml / r.voxel_volume_ml - 1))
+                       : PrintText("<td>%.2f", r.volume_ml);
+    page += PrintText("<td>%d<td>%zu", r.pieces, r.triangles);
   }
   page += "</table><p>";
   if (has_voxels)
@@ -131,7 +124,7 @@ std::map<std::string, TriangleMesh> SurfacesOfLabels(const AnatomyImport& import
                                                      const Say& say, LabelMap* map,
                                                      std::map<int, std::size_t>* counts) {
   *map = ReadLabelMap(import.labels);
-  say(Text("%d x %d x %d voxels", map->size[0], map->size[1], map->size[2]));
+  say(PrintText("%d x %d x %d voxels", map->size[0], map->size[1], map->size[2]));
   *counts = CountLabels(*map);
   std::vector<int> wanted;
   for (const LabelUse& use : uses) {
@@ -156,7 +149,7 @@ std::map<std::string, TriangleMesh> SurfacesOfFiles(const AnatomyImport& import,
   for (const LabelUse& use : read.uses) {
     TriangleMesh mesh = SurfaceOf(ReadMesh(import.labels / use.file));
     for (Vec3d& p : mesh.vertices) p = read.W_from_file * p;
-    say(Text("%s: %zu triangles", use.file.c_str(), mesh.triangles.size()));
+    say(PrintText("%s: %zu triangles", use.file.c_str(), mesh.triangles.size()));
     surfaces[use.name] = std::move(mesh);
   }
   return surfaces;
@@ -277,7 +270,8 @@ std::string SuggestLabelUses(const fs::path& labels) {
     const bool fits = entry.size >= least && listed < kMostLabels;
     listed += fits ? 1 : 0;
     text += std::string(fits ? "  - {" : "  # - {") + entry.source + ", name: " + entry.name +
-            (&entry == &*largest ? ", organ: true" : ", role: other") + Text("}   # %.6g %s\n", entry.size, entry.unit);
+            (&entry == &*largest ? ", organ: true" : ", role: other") +
+            PrintText("}   # %.6g %s\n", entry.size, entry.unit);
   }
   return text;
 }
@@ -314,7 +308,8 @@ std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const P
     report.triangles = surface.triangles.size();
     const std::string file = use.name + ".ply";
     WriteText(import.out / file, Ply(surface));
-    say(Text("%s: %.1f ml, %d pieces, %zu triangles", file.c_str(), report.volume_ml, report.pieces, report.triangles));
+    say(PrintText("%s: %.1f ml, %d pieces, %zu triangles", file.c_str(), report.volume_ml, report.pieces,
+                  report.triangles));
     if (!use.is_organ) {
       scene.surroundings.push_back(
           {use.name, use.role, import.out / file, Vec3f::Zero(), use.triangles_max, use.collides});

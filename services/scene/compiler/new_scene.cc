@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "services/base/core/error.h"
 #include "services/scene/builder/build.h"
@@ -10,19 +9,11 @@
 #include "services/scene/compiler/import.h"
 #include "services/scene/compiler/mesh_repair.h"
 #include "services/scene/compiler/placement.h"
+#include "services/scene/compiler/print_text.h"
 #include "services/scene/compiler/scene_yaml.h"
 
 namespace fulcrum::scene {
 namespace {
-
-/// printf into a string.
-template <class... Values>
-std::string Text(const char* format, Values... values) {
-  std::string text(static_cast<std::size_t>(std::snprintf(nullptr, 0, format, values...)) + 1, '\0');
-  std::snprintf(text.data(), text.size(), format, values...);
-  text.pop_back();
-  return text;
-}
 
 /// The unit in which the organ is of a size that organs have.
 std::string LikelyUnit(const MeshFile& file, const std::string& name) {
@@ -31,7 +22,7 @@ std::string LikelyUnit(const MeshFile& file, const std::string& name) {
   for (const char* unit : {"mm", "m", "cm", "um"}) {
     if (const double size_m = size * LengthUnit(unit); size_m >= kSmall_m && size_m <= kLarge_m) return unit;
   }
-  throw InputError(name + ": its longest side is " + Text("%.4g", size) +
+  throw InputError(name + ": its longest side is " + PrintText("%.4g", size) +
                    ", which is no organ in mm, cm, m or um; give --unit, and `scale` in the description");
 }
 
@@ -180,7 +171,7 @@ void ChooseSide(NewScene* scene, ImportSettings* import, const Take& take, Anato
   }
 }
 
-std::string TextOf(const Vec3d& p_mm) { return Text("[%.4g, %.4g, %.4g]", p_mm.x(), p_mm.y(), p_mm.z()); }
+std::string TextOf(const Vec3d& p_mm) { return PrintText("[%.4g, %.4g, %.4g]", p_mm.x(), p_mm.y(), p_mm.z()); }
 
 /// A scalar of YAML with any characters but those of control.
 std::string Quoted(const std::string& text) {
@@ -204,12 +195,12 @@ std::string OrganText(const NewScene& scene, const ImportSettings& import, bool 
   } else {
     text += "    # patch: {at_mm: [x, y, z], width_mm: 60, length_mm: 80}   to move it, in the frame of the file\n";
   }
-  text += Text("    cavity_mm: %.0f\n", 1e3 * import.cavity_m);
+  text += PrintText("    cavity_mm: %.0f\n", 1e3 * import.cavity_m);
   if (!scene.surroundings.empty()) text += "    surroundings:\n";
   for (const ImportSettings::Surrounding& s : scene.surroundings) {
     text += "      - {name: " + s.name + ", role: " + std::string(RoleName(s.role)) +
             ", file: " + s.file.filename().string() +
-            Text(", triangles_max: %d%s}\n", s.triangles_max, s.collides ? ", collides: true" : "");
+            PrintText(", triangles_max: %d%s}\n", s.triangles_max, s.collides ? ", collides: true" : "");
   }
   return text;
 }
@@ -223,15 +214,15 @@ std::string ScriptText(const SheetSize& size, const Vec3d& hook_wait_mm) {
   const double grasp = std::max(0.2, 0.5 - kGraspBeside / size.width),
                at = std::min(0.7, 0.5 + kCutBeside / size.width);
   const double press_mm = 0.15 * lift_mm, start_s = 7.3, end_s = start_s + cut / kSpeed;
-  const std::string fold = Text("sheet: [%.3f, 0.5]", grasp);
-  std::string text = Text(
+  const std::string fold = PrintText("sheet: [%.3f, 0.5]", grasp);
+  std::string text = PrintText(
       "script:                          # places: fractions (across, along) of the membrane and the "
       "height above it\n  duration_s: %.1f\n",
       end_s + 5.2);
   text += "  tool0:                         # closes on a fold, lifts it, releases it\n";
   const auto left = [&](double time_s, double height_mm, double jaw_deg) {
-    text +=
-        Text("    - {time_s: %.1f, %s, height_mm: %.1f, jaw_deg: %.0f}\n", time_s, fold.c_str(), height_mm, jaw_deg);
+    text += PrintText("    - {time_s: %.1f, %s, height_mm: %.1f, jaw_deg: %.0f}\n", time_s, fold.c_str(), height_mm,
+                      jaw_deg);
   };
   left(0, 45, 50);
   left(1.2, 10, 50);
@@ -246,10 +237,10 @@ std::string ScriptText(const SheetSize& size, const Vec3d& hook_wait_mm) {
   left(end_s + 4.0, 40, 50);
   text += "  tool1:                         # waits aside, cuts along the organ beside the fold\n";
   const auto right = [&](double time_s, double t, double height_mm, const char* more) {
-    text += Text("    - {time_s: %.1f, sheet: [%.3f, %.3f], height_mm: %.1f%s}\n", time_s, at, t, height_mm, more);
+    text += PrintText("    - {time_s: %.1f, sheet: [%.3f, %.3f], height_mm: %.1f%s}\n", time_s, at, t, height_mm, more);
   };
   const std::string aside =
-      Text(", offset_mm: [%.0f, %.0f, %.0f]", hook_wait_mm.x(), hook_wait_mm.y(), hook_wait_mm.z());
+      PrintText(", offset_mm: [%.0f, %.0f, %.0f]", hook_wait_mm.x(), hook_wait_mm.y(), hook_wait_mm.z());
   right(0, from, 25, aside.c_str());
   right(4.5, from, 25, aside.c_str());
   right(6.3, from, 10, "");
@@ -270,8 +261,8 @@ std::string DescribeNewScene(const NewScene& given, const Progress& progress) {
     const MeshFile file = ReadMesh(scene.mesh);
     scene.unit = LikelyUnit(file, scene.mesh.string());
     if (progress) {
-      progress(Text("unit: %s, so that the organ is %.0f mm long; --unit says otherwise", scene.unit.c_str(),
-                    1e3 * LengthUnit(scene.unit) * LongestSide(file)));
+      progress(PrintText("unit: %s, so that the organ is %.0f mm long; --unit says otherwise", scene.unit.c_str(),
+                         1e3 * LengthUnit(scene.unit) * LongestSide(file)));
     }
   }
   SceneSettings settings;
@@ -309,14 +300,14 @@ std::string DescribeNewScene(const NewScene& given, const Progress& progress) {
   const Vec3d grasper = 1e3 * Trocar(Vec3d(-0.085, -0.045, 0.092), Vec3d(-0.01, 0, 0), kShaft, obstacles);
   const Vec3d hook = 1e3 * Trocar(Vec3d(0.098, 0, 0.034), Vec3d(0.003, 0, 0), kShaft, obstacles);
   const MembraneSettings& m = settings.membrane;
-  std::string text = "# " + Text("A membrane of %.0f x %.0f mm over ", 1e3 * size.width, 1e3 * size.length) +
+  std::string text = "# " + PrintText("A membrane of %.0f x %.0f mm over ", 1e3 * size.width, 1e3 * size.length) +
                      Quoted(scene.mesh.filename().string()) + "." +
                      "\n# The membrane's middle is the origin of the scene, z leads away from the organ, y along it. "
                      "Every key: services/scene/README.md.\n" +
                      "name: \"" + scene.name + "\"\n" +
                      "description: " + Quoted("Organ from " + scene.mesh.filename().string()) + "\n\n";
   text += OrganText(scene, import, anatomy.is_patch) + "\n";
-  text += Text(
+  text += PrintText(
       "membrane:\n  rows: %d\n  cols: %d\n  gap_mm: %.1f                  # fat between membrane and organ\n"
       "  binding_reach_mm: %.1f\n\n",
       m.rows, m.cols, 1e3 * m.gap_m, 1e3 * m.binding_reach_m);
@@ -334,7 +325,7 @@ std::string DescribeNewScene(const NewScene& given, const Progress& progress) {
       "  conductivity_W_mK: 0.45\n  latent_heat_J_m3: 1.6e9\n  sigma_S_m: 0.35\n  sigma_fat_S_m: 0.035\n"
       "  fat_depth_mm: 5\n  v_max_V: 350\n  hook_radius_mm: 0.5\n\n";
   text += "haptics: {force_limit_N: 3.3, slew_N_per_ms: 0.4, force_scale: 0.3}\n\n";
-  text += Text(
+  text += PrintText(
       "render:\n  width: 960\n  height: 540\n  rate_Hz: 15\n  png_rate_Hz: 2\n  scope_tip_mm: [%.0f, %.0f, %.0f]\n"
       "  scope_target_mm: [0, 0, 0]\n  fov_deg: 60\n  scope_angle_deg: 30\n\n",
       scope.x(), scope.y(), scope.z());
