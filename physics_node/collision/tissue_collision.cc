@@ -151,7 +151,7 @@ void TissueCollision::AddOrganRow(const Near& near, const Signed& now, std::vect
   }
   row.normal = now.normal;
   row.offset = watch.clearance;
-  row.source = kSource | near.watch;
+  row.source = kSource | (watch.particle < scene_.membrane.first ? kSolidSource : 0u) | near.watch;
 }
 
 void TissueCollision::FindOrganRows(Found* found, float u0, float u1) const {

@@ -25,6 +25,8 @@ class TissueCollision {
  public:
   /// Bit in ContactRow.source that marks the rows of this class.
   static constexpr std::uint32_t kSource = 0x80000000u;
+  /// Bit in ContactRow.source that marks those of a solid's vertex, not of the membrane.
+  static constexpr std::uint32_t kSolidSource = 0x40000000u;
   /// Most rows in a substep; memory for them is reserved at the start. Assumed.
   static constexpr std::size_t kMaxRows = 4096;
 

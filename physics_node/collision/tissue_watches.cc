@@ -1,15 +1,41 @@
 // Setup of TissueCollision: watches of the membrane against the organ, of both against the fixed surfaces.
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <utility>
 
 #include "physics_node/collision/tissue_collision.h"
 #include "services/base/core/breathing.h"
+#include "services/base/core/solids.h"
 
 namespace fulcrum::physics {
 namespace {
 
 /// Range of the search for the organ from the membrane at rest: contains every scene [m].
 constexpr float kRestRange = 1.0f;
+/// Of several solids, those are watched whose box is nearer than this at rest: tissue moves less than that towards them
+/// [m].
+constexpr float kSolidRange = 0.06f;
+
+/// Surface triangles of one solid in the rest shape.
+struct SolidSurface {
+  TriangleTree tree;
+  std::vector<Index> triangles;  ///< Of tube_surface, by triangle of the tree.
+  Eigen::AlignedBox3f box;
+};
+
+std::vector<SolidSurface> SurfacesOf(const TissueScene& scene, const std::vector<Index>& solid) {
+  std::vector<SolidSurface> surfaces(SolidCount(scene));
+  std::vector<std::vector<std::array<Vec3f, 3>>> corners(surfaces.size());
+  for (Index t = 0; t < scene.tube_surface.size(); ++t) {
+    const Triangle& v = scene.tube_surface[t];
+    SolidSurface& surface = surfaces[solid[v[0]]];
+    surface.triangles.push_back(t);
+    for (const Index vertex : v) surface.box.extend(scene.rest_position[vertex]);
+    corners[solid[v[0]]].push_back({scene.rest_position[v[0]], scene.rest_position[v[1]], scene.rest_position[v[2]]});
+  }
+  for (std::size_t i = 0; i < surfaces.size(); ++i) surfaces[i].tree = TriangleTree(std::move(corners[i]));
+  return surfaces;
+}
 
 }  // namespace
 
@@ -25,13 +51,11 @@ void TissueCollision::Watches::MakeGroups(const ParticleStore& particles) {
   times.resize(all.size());
 }
 
+/// Membrane against each solid, and the surface of each solid against the others.
 void TissueCollision::WatchOrgan() {
-  std::vector<std::array<Vec3f, 3>> corners;
   std::vector<std::vector<Index>> around(scene_.tube_vertex_count);
   for (Index t = 0; t < scene_.tube_surface.size(); ++t) {
-    const Triangle& v = scene_.tube_surface[t];
-    corners.push_back({scene_.rest_position[v[0]], scene_.rest_position[v[1]], scene_.rest_position[v[2]]});
-    for (const Index vertex : v) {
+    for (const Index vertex : scene_.tube_surface[t]) {
       around[vertex].push_back(t);
     }
   }
@@ -48,26 +72,38 @@ void TissueCollision::WatchOrgan() {
     ring_.insert(ring_.end(), ring.begin(), ring.end());
     ring_start_.push_back(static_cast<Index>(ring_.size()));
   }
-  const TriangleTree tree(corners);
-  Index guess = kNoIndex;
-  for (Index node = 0; node < scene_.membrane.node_count() && !tree.empty(); ++node) {
-    const Index particle = scene_.membrane.first + node;
+  const std::vector<Index> solid = SolidOfVertices(scene_);
+  const std::vector<SolidSurface> surfaces = SurfacesOf(scene_, solid);
+  std::vector<Index> guess(surfaces.size(), kNoIndex);
+  const auto watch_from = [&](Index particle, Index own) {
     const Vec3f& p = scene_.rest_position[particle];
-    const TriangleTree::Hit hit = tree.Nearest(p, kRestRange, guess);
-    guess = hit.triangle;
-    if (scene_.inverse_mass[particle] > 0.0f && hit.triangle != kNoIndex) {
-      const float rest = SignedDistance(p, corners[hit.triangle]).distance;
-      if (rest > 0.0f) {
-        const float clearance = std::min(scene_.physics.collision_margin_m, kRestShare * rest);
-        Watch watch;
-        watch.particle = particle;
-        watch.at = particles_->Ref(particle);
-        watch.triangle = hit.triangle;
-        watch.clearance = clearance;
-        watch.SetGap(rest - clearance, RelativePlace(watch), 0.0f);
-        organ_.all.push_back(watch);
-      }
+    for (Index i = 0; i < surfaces.size(); ++i) {
+      const SolidSurface& surface = surfaces[i];
+      const bool is_near = surfaces.size() == 1 || surface.box.exteriorDistance(p) < kSolidRange;
+      if (i == own || surface.tree.empty() || !is_near) continue;
+      const TriangleTree::Hit hit = surface.tree.Nearest(p, kRestRange, guess[i]);
+      guess[i] = hit.triangle;
+      if (hit.triangle == kNoIndex || !(scene_.inverse_mass[particle] > 0.0f)) continue;
+      const Index triangle = surface.triangles[hit.triangle];
+      const Triangle& v = scene_.tube_surface[triangle];
+      const float rest =
+          SignedDistance(p, {scene_.rest_position[v[0]], scene_.rest_position[v[1]], scene_.rest_position[v[2]]})
+              .distance;
+      if (!(rest > 0.0f)) continue;
+      Watch watch;
+      watch.particle = particle;
+      watch.at = particles_->Ref(particle);
+      watch.triangle = triangle;
+      watch.clearance = std::min(scene_.physics.collision_margin_m, kRestShare * rest);
+      watch.SetGap(rest - watch.clearance, RelativePlace(watch), 0.0f);
+      organ_.all.push_back(watch);
     }
+  };
+  for (Index vertex = 0; vertex < scene_.tube_vertex_count && surfaces.size() > 1; ++vertex) {
+    if (!around[vertex].empty()) watch_from(vertex, solid[vertex]);
+  }
+  for (Index node = 0; node < scene_.membrane.node_count(); ++node) {
+    watch_from(scene_.membrane.first + node, kNoIndex);
   }
   organ_.MakeGroups(*particles_);
   organ_moved_of_.assign(std::size_t{particles_->tube_blocks()} + 1, 0.0f);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <map>
 
+#include "services/base/core/solids.h"
+
 namespace fulcrum::physics {
 namespace {
 
@@ -35,13 +37,14 @@ ElasticForce::ElasticForce(const TissueScene& scene, const TissueModel* model, c
           static_cast<float>(kTriangleShare * scene.physics.membrane_Et_N_per_m * area / length_sq);
     }
   }
+  const std::vector<Index> solid = SolidOfVertices(scene);
   std::map<std::pair<Index, Index>, double> tube;
   for (const Tetrahedron& t : scene.tets) {
     const double volume = (x(t[1]) - x(t[0])).cross(x(t[2]) - x(t[0])).dot(x(t[3]) - x(t[0])) / 6.0;
     for (int i = 0; i < 4; ++i) {
       for (int j = i + 1; j < 4; ++j) {
-        tube[std::minmax(t[i], t[j])] +=
-            kTetShare * scene.physics.tube_youngs_modulus_Pa * volume / (x(t[i]) - x(t[j])).squaredNorm();
+        tube[std::minmax(t[i], t[j])] += kTetShare * static_cast<double>(YoungsModulusOf(scene, solid[t[0]])) * volume /
+                                         (x(t[i]) - x(t[j])).squaredNorm();
       }
     }
   }

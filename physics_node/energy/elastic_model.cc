@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/base/core/solids.h"
+
 namespace fulcrum::physics {
 namespace {
 
@@ -138,13 +140,15 @@ void AddTets(const TissueScene& scene, ElasticModel* model) {
   const double E = scene.physics.tube_youngs_modulus_Pa, nu = scene.physics.tube_poisson;
   model->mu_Pa = E / (2 * (1 + nu));
   model->lambda_Pa = E * nu / ((1 + nu) * (1 - 2 * nu));
+  const std::vector<Index> solid = SolidOfVertices(scene);
   model->tets.reserve(scene.tets.size());
   for (const Tetrahedron& v : scene.tets) {
     Mat3d edges;
     for (int i = 0; i < 3; ++i) {
       edges.col(i) = Rest(scene, v[static_cast<std::size_t>(i) + 1]) - Rest(scene, v[0]);
     }
-    model->tets.push_back({v, edges.determinant() / 6.0, edges.inverse()});
+    const double scale = static_cast<double>(YoungsModulusOf(scene, solid[v[0]])) / E;
+    model->tets.push_back({v, edges.determinant() / 6.0, edges.inverse(), scale});
   }
   AddOrganPatches(model);
 }
@@ -180,6 +184,17 @@ void AddBindings(const TissueScene& scene, ElasticModel* model) {
     b.rest_length = binding.rest_length;
     b.stiffness = stiffness;
     model->bindings.push_back(b);
+  }
+}
+
+void AddAttachments(const TissueScene& scene, ElasticModel* model) {
+  for (const Attachment& attachment : scene.attachments) {
+    const Triangle& s = attachment.surface;
+    const std::array<float, 3>& b = attachment.barycentric;
+    ElasticHinge& hinge = model->attachments.emplace_back();
+    hinge.v = {attachment.vertex, s[0], s[1], s[2]};
+    hinge.c = {1, -static_cast<double>(b[0]), -static_cast<double>(b[1]), -static_cast<double>(b[2])};
+    hinge.stiffness = attachment.stiffness_N_per_m;
   }
 }
 
@@ -252,6 +267,7 @@ ElasticModel BuildElasticModel(const TissueScene& scene) {
   AddHinges(scene, &model);
   AddTets(scene, &model);
   AddBindings(scene, &model);
+  AddAttachments(scene, &model);
   AddLoad(&model);
   return model;
 }

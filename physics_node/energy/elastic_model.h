@@ -6,6 +6,7 @@
 //        + sum hinges   k / 2 |sum_i c_i (x_i - X_i)|^2                                  (membrane bending)
 //        + organ: nodal patches, see below                                              (tet_energy.h)
 //        + sum bindings k / 2 (|x_m - sum_i b_i x_i| - d)^2                              (eq. 9 of the paper)
+//        + sum attachments, the same energy as a hinge's                               (between solids)
 //
 // Model continuum: a triangle whose three edges exist carries the sheet, and its edges have no springs of their own. A
 // triangle that a cut has opened is not a continuum any more: its edges that are left act as springs, each with the
@@ -65,12 +66,13 @@ struct ElasticTet {
   Tetrahedron v{};
   double volume = 0;    ///< At rest [m^3].
   Mat3d inverse_edges;  ///< Inverse of the matrix with columns X1 - X0, X2 - X0, X3 - X0 [1/m].
+  double scale = 1;     ///< Moduli of its solid over mu_Pa and lambda_Pa.
 };
 
 /// The tets around an organ vertex as one element.
 struct ElasticPatch {
   Index vertex = 0;
-  double volume = 0;                     ///< V_n, at rest [m^3].
+  double volume = 0;                     ///< V_n, at rest, times the scale of its tets [m^3].
   double variance = 0;                   ///< a_n.
   Index first_link = 0, link_count = 0;  ///< Its range of ElasticModel::patch_links.
 };
@@ -114,8 +116,9 @@ struct ElasticModel {
   std::vector<ElasticPatchLink> patch_links;  ///< Sorted by vertex within a patch; always contains the patch's own.
   std::vector<ElasticShearLink> shear_links;  ///< Sorted by (a, b), a < b.
   std::vector<ElasticBinding> bindings;
-  double stiffening = 0;            ///< c of the membrane.
-  double mu_Pa = 0, lambda_Pa = 0;  ///< Lamé parameters of the organ.
+  std::vector<ElasticHinge> attachments;  ///< Of one solid to another: v[0], and a point of a triangle of the other.
+  double stiffening = 0;                  ///< c of the membrane.
+  double mu_Pa = 0, lambda_Pa = 0;        ///< Lamé parameters of the organ.
   double damping_per_s = 0;
   Vec3d gravity = Vec3d::Zero();
 

@@ -75,7 +75,7 @@ Shares SharesOf(const std::vector<ElasticTet>& tets, const std::vector<double>& 
       for (int j = 0; j < 4; ++j) {
         const std::uint64_t n = tet.v[static_cast<std::size_t>(i)], v = tet.v[static_cast<std::size_t>(j)];
         shares.sorted.emplace_back(n << 32 | v, static_cast<std::uint32_t>(shares.all.size()));
-        shares.all.push_back({tet.volume / 4 * g.col(j), -mean * tet.volume * g.col(i).dot(g.col(j))});
+        shares.all.push_back({tet.volume / 4 * g.col(j), -mean * tet.scale * tet.volume * g.col(i).dot(g.col(j))});
       }
     }
   }
@@ -87,9 +87,12 @@ Shares SharesOf(const std::vector<ElasticTet>& tets, const std::vector<double>& 
 }  // namespace
 
 void AddOrganPatches(ElasticModel* model) {
-  std::vector<double> volume(model->rest_position.size());
+  std::vector<double> volume(model->rest_position.size()), scale(volume.size(), 1.0);
   for (const ElasticTet& tet : model->tets) {
-    for (const Index n : tet.v) volume[n] += tet.volume / 4;
+    for (const Index n : tet.v) {
+      volume[n] += tet.volume / 4;
+      scale[n] = tet.scale;
+    }
   }
   const std::vector<double> variance = VarianceOf(model->tets, volume.size());
   const Shares shares = SharesOf(model->tets, variance);
@@ -106,9 +109,10 @@ void AddOrganPatches(ElasticModel* model) {
     }
     const auto n = static_cast<Index>(pair >> 32), v = static_cast<Index>(pair);
     if (model->patches.empty() || model->patches.back().vertex != n) {
-      model->patches.push_back({n, volume[n], variance[n], static_cast<Index>(model->patch_links.size()), 0});
+      model->patches.push_back(
+          {n, scale[n] * volume[n], variance[n], static_cast<Index>(model->patch_links.size()), 0});
     }
-    model->patch_links.push_back({v, sum.gradient / model->patches.back().volume});
+    model->patch_links.push_back({v, sum.gradient / volume[n]});
     ++model->patches.back().link_count;
     if (n < v) model->shear_links.push_back({n, v, model->mu_Pa * sum.weight});
   }

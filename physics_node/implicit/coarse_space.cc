@@ -5,8 +5,10 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <set>
 
 #include "physics_node/implicit/coarse_row.h"
+#include "services/base/core/solids.h"
 
 namespace fulcrum::physics::implicit {
 namespace {
@@ -162,24 +164,71 @@ std::array<int, 4> CoarseSpace::CoarseGrid::NodesOf(int row_cell, int column_cel
   return around;
 }
 
-/// The lattice over the organ; only nodes that carry something get a number.
+/// Origin and distance of a solid's nodes.
+struct CoarseSpace::Lattice {
+  Vec3d origin = Vec3d::Zero();
+  double spacing = kLattice_m;
+
+  [[nodiscard]] std::array<int, 3> CellOf(const Vec3d& p, Vec3d* fraction) const {
+    const Vec3d at = (p - origin) / spacing, low = at.array().floor();
+    *fraction = at - low;
+    return {static_cast<int>(low[0]), static_cast<int>(low[1]), static_cast<int>(low[2])};
+  }
+};
+
+/// Small solids get a lattice as fine as their number of vertices permits: bending of something thin is not in the span
+/// of a coarse one, and converges over seconds. Large ones get a coarser one: the factor's cost grows faster than
+/// theirs.
+CoarseSpace::Lattice CoarseSpace::LatticeOf(const Solid& solid, const ElasticModel& model) {
+  constexpr double kFiner = 0.75, kFinest_m = 0.002;
+  constexpr std::size_t kMostNodes = 96, kVerticesPerNode = 8;
+  const std::span<const Vec3d> points = std::span(model.rest_position).subspan(solid.first_vertex, solid.vertex_count);
+  Lattice lattice;
+  if (points.empty()) return lattice;
+  lattice.origin = points[0];
+  for (const Vec3d& p : points) lattice.origin = lattice.origin.cwiseMin(p);
+  lattice.origin.array() -= 1e-6;
+  const auto nodes = [&](const Lattice& of) {
+    std::set<std::array<int, 3>> keys;
+    for (const Vec3d& p : points) {
+      Vec3d fraction;
+      const std::array<int, 3> cell = of.CellOf(p, &fraction);
+      for (int corner = 0; corner < 8; ++corner) {
+        keys.insert({cell[0] + (corner & 1), cell[1] + (corner >> 1 & 1), cell[2] + (corner >> 2)});
+      }
+    }
+    return keys.size();
+  };
+  const std::size_t most = std::max(kMostNodes, points.size() / kVerticesPerNode);
+  while (nodes(lattice) > most) lattice.spacing /= kFiner;
+  for (Lattice finer = lattice; finer.spacing > kFinest_m; lattice = finer) {
+    finer.spacing *= kFiner;
+    if (nodes(finer) > std::min(kMostNodes, points.size())) break;
+  }
+  return lattice;
+}
+
+/// The lattices over the solids; only nodes that carry something get a number.
 void CoarseSpace::BuildLattice(const TissueScene& scene, const ElasticModel& model) {
   grid_.nodes = grid_.columns * grid_.rows;
-  std::map<std::array<int, 3>, std::uint16_t> lattice;
+  const std::vector<Index> solid = SolidOfVertices(scene);
+  std::vector<Lattice> lattices;
+  for (const Solid& s : scene.solids) lattices.push_back(LatticeOf(s, model));
+  if (scene.solids.size() < 2) lattices.assign(1, Lattice{});
+  std::map<std::pair<Index, std::array<int, 3>>, std::uint16_t> numbers;
   for (Index v = 0; v < scene.tube_vertex_count; ++v) {
-    const Vec3d at = model.rest_position[v] / kLattice_m;
     LatticePlace weights{};
-    const Vec3d low = at.array().floor();
+    Vec3d fraction;
+    const std::array<int, 3> cell = lattices[solid[v]].CellOf(model.rest_position[v], &fraction);
     for (std::size_t corner = 0; corner < kCellCorners; ++corner) {
-      std::array<int, 3> key;
+      std::array<int, 3> key = cell;
       double weight = 1;
       for (int axis = 0; axis < 3; ++axis) {
         const int up = static_cast<int>(corner >> axis) & 1;
-        const double fraction = at[axis] - low[axis];
-        key[static_cast<std::size_t>(axis)] = static_cast<int>(low[axis]) + up;
-        weight *= up ? fraction : 1 - fraction;
+        key[static_cast<std::size_t>(axis)] += up;
+        weight *= up ? fraction[axis] : 1 - fraction[axis];
       }
-      const auto [it, fresh] = lattice.try_emplace(key, static_cast<std::uint16_t>(grid_.nodes));
+      const auto [it, fresh] = numbers.try_emplace({solid[v], key}, static_cast<std::uint16_t>(grid_.nodes));
       grid_.nodes += fresh ? 1 : 0;
       weights.node[corner] = it->second;
       weights.weight[corner] = model.fixed(v) ? 0.0f : static_cast<float>(weight);
@@ -197,8 +246,9 @@ void CoarseSpace::BuildLattice(const TissueScene& scene, const ElasticModel& mod
     }
   }
   place.resize(static_cast<std::size_t>(grid_.nodes));
-  for (const auto& [key, node] : lattice) {
-    place[node] = kLattice_m * Vec3d(key[0], key[1], key[2]);
+  for (const auto& [key, node] : numbers) {
+    const Lattice& lattice = lattices[key.first];
+    place[node] = lattice.origin + lattice.spacing * Vec3d(key.second[0], key.second[1], key.second[2]);
   }
   matrix_.factor = CoarseFactor(AlongLongestSide(place));
   scratch_.nodes4 = FloatArray(kVertexFloats * static_cast<std::size_t>(grid_.nodes));
@@ -264,38 +314,56 @@ void CoarseSpace::AddTube(const ElasticModel& model) {
   }
 }
 
+/// Adds share times the coarse nodes' weights at a particle.
+void CoarseSpace::AddWeights(const ElasticModel& model, const ParticleStore& particles, Index particle, double share,
+                             std::vector<std::pair<int, double>>* weights) const {
+  if (particle < particles.tube_count()) {
+    const LatticePlace& w = grid_.tube_weights[particle];
+    for (std::size_t k = 0; k < kCellCorners; ++k) {
+      weights->emplace_back(w.node[k], share * static_cast<double>(w.weight[k]));
+    }
+    return;
+  }
+  if (model.fixed(particle)) return;
+  const Index node = particle - particles.tube_count();
+  const CellPlace& row = grid_.row_place[node / layout_.cols];
+  const CellPlace& column = grid_.column_place[node % layout_.cols];
+  for (int i = 0; i < 2; ++i) {
+    for (int j = 0; j < 2; ++j) {
+      const double w =
+          static_cast<double>((i ? row.fraction : 1 - row.fraction) * (j ? column.fraction : 1 - column.fraction));
+      if (w != 0) {
+        weights->emplace_back((row.cell + i) * grid_.columns + column.cell + j, share * w);
+      }
+    }
+  }
+}
+
 void CoarseSpace::AddBindings(const ElasticModel& model, const ParticleStore& particles) {
-  for (const ElasticBinding& binding : model.bindings) {
-    std::vector<std::pair<int, double>> weights;
-    const Index node = binding.membrane - particles.tube_count();
-    const CellPlace& row = grid_.row_place[node / layout_.cols];
-    const CellPlace& column = grid_.column_place[node % layout_.cols];
-    if (!model.fixed(binding.membrane)) {
-      for (int i = 0; i < 2; ++i) {
-        for (int j = 0; j < 2; ++j) {
-          const double w =
-              static_cast<double>((i ? row.fraction : 1 - row.fraction) * (j ? column.fraction : 1 - column.fraction));
-          if (w != 0) {
-            weights.emplace_back((row.cell + i) * grid_.columns + column.cell + j, w);
-          }
-        }
-      }
-    }
-    Vec3d direction = model.rest_position[binding.membrane];
-    for (std::size_t i = 0; i < 3; ++i) {
-      direction -= binding.barycentric[i] * model.rest_position[binding.surface[i]];
-      const LatticePlace& w = grid_.tube_weights[binding.surface[i]];
-      for (std::size_t k = 0; k < kCellCorners; ++k) {
-        weights.emplace_back(w.node[k], -binding.barycentric[i] * static_cast<double>(w.weight[k]));
-      }
-    }
-    direction.normalize();
-    const Mat3d stiffness = binding.stiffness * direction * direction.transpose();
+  std::vector<std::pair<int, double>> weights;
+  const auto add = [&](const Mat3d& stiffness) {
     for (const auto& [a, wa] : weights) {
       for (const auto& [b, wb] : weights) {
         matrix_.constant.block<3, 3>(3 * a, 3 * b) += (wa * wb * stiffness).cast<float>();
       }
     }
+    weights.clear();
+  };
+  for (const ElasticBinding& binding : model.bindings) {
+    AddWeights(model, particles, binding.membrane, 1, &weights);
+    Vec3d direction = model.rest_position[binding.membrane];
+    for (std::size_t i = 0; i < 3; ++i) {
+      direction -= binding.barycentric[i] * model.rest_position[binding.surface[i]];
+      AddWeights(model, particles, binding.surface[i], -binding.barycentric[i], &weights);
+    }
+    direction.normalize();
+    add(binding.stiffness * direction * direction.transpose());
+  }
+  for (const ElasticHinge& attachment : model.attachments) {
+    for (std::size_t i = 0; i < attachment.v.size(); ++i) {
+      AddWeights(model, particles, attachment.v[i], attachment.c[i], &weights);
+    }
+    add(attachment.stiffness * Mat3d::Identity());
   }
 }
 

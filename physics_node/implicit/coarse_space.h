@@ -132,10 +132,14 @@ class CoarseSpace {
   };
 
   void BuildHats();
+  struct Lattice;
+  static Lattice LatticeOf(const Solid& solid, const ElasticModel& model);
   void BuildLattice(const TissueScene& scene, const ElasticModel& model);
   void AddTubeMass(const ElasticModel& model);
   void AddTube(const ElasticModel& model);
   void AddBindings(const ElasticModel& model, const ParticleStore& particles);
+  void AddWeights(const ElasticModel& model, const ParticleStore& particles, Index particle, double share,
+                  std::vector<std::pair<int, double>>* weights) const;
   void AddRows(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int rows);
   void AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int row);
   [[nodiscard]] std::array<std::uint32_t, 2> HatsOf(std::uint32_t col) const;

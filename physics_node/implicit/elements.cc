@@ -14,6 +14,8 @@ namespace {
 /// the membrane (some 200 N/m), so tissue yields and the contact hardly does; tissue rests on the fat around it, which
 /// is soft. Assumed.
 constexpr float kToolStiffness_N_per_m = 2000.0f, kTissueStiffness_N_per_m = 30.0f;
+/// Of a vertex of one solid with another solid: it stands for some 25 mm^2, a node of the membrane for one.
+constexpr float kSolidStiffness_N_per_m = 400.0f;
 /// Least movement along a surface that the Coulomb force is divided by [m]: less within a substep counts as sticking.
 /// Some hundred times the rounding of a position.
 constexpr float kStickDistance_m = 1e-6f;
@@ -138,7 +140,8 @@ ContactState StateOf(float h, const ContactRow& row, const Vec3f& here, const fl
 }  // namespace
 
 float Elements::ContactStiffness(const ContactRow& row) {
-  return IsTissue(row) ? kTissueStiffness_N_per_m : kToolStiffness_N_per_m;
+  if (!IsTissue(row)) return kToolStiffness_N_per_m;
+  return (row.source & TissueCollision::kSolidSource) != 0 ? kSolidStiffness_N_per_m : kTissueStiffness_N_per_m;
 }
 bool Elements::IsTissue(const ContactRow& row) { return (row.source & TissueCollision::kSource) != 0; }
 
@@ -154,8 +157,23 @@ Elements::Elements(const TissueScene& scene, const ElasticModel& model, const Pa
       e.weight[i + 1] = -static_cast<float>(binding.barycentric[i]);
     }
     bindings_.push_back(e);
-    binding_rest_.push_back({static_cast<float>(binding.rest_length), static_cast<float>(binding.stiffness),
-                             binding.membrane - scene.membrane.first});
+    binding_rest_.push_back({static_cast<float>(binding.rest_length),
+                             static_cast<float>(binding.stiffness),
+                             binding.membrane - scene.membrane.first,
+                             {}});
+  }
+  for (const ElasticHinge& attachment : model.attachments) {
+    Element& e = bindings_.emplace_back();
+    BindingRest& rest =
+        binding_rest_.emplace_back(BindingRest{0.0f, static_cast<float>(attachment.stiffness), kNoIndex, {}});
+    Vec3d offset = Vec3d::Zero();
+    for (std::size_t i = 0; i < 4; ++i) {
+      e.at[i] = particles.Ref(attachment.v[i]);
+      e.weight[i] = static_cast<float>(attachment.c[i]);
+      offset += attachment.c[i] * model.rest_position[attachment.v[i]];
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      rest.offset[axis] = static_cast<float>(offset[static_cast<Eigen::Index>(axis)]);
   }
   computed_ = MakeSelection();
   binding_force_ = FloatArray(kVertexFloats * (bindings_.size() + 1));
@@ -176,7 +194,8 @@ Elements::Elements(const TissueScene& scene, const ElasticModel& model, const Pa
 
 void Elements::UpdateTopology(const TissueModel& tissue) {
   for (std::size_t i = 0; i < bindings_.size(); ++i) {
-    bindings_[i].active = tissue.NodeAlive(binding_rest_[i].node);
+    const Index node = binding_rest_[i].node;
+    bindings_[i].active = node == kNoIndex || tissue.NodeAlive(node);
     if (!bindings_[i].active) {
       std::fill_n(binding_force_.data() + kVertexFloats * i, kVertexFloats, 0.0f);
     }
@@ -200,6 +219,11 @@ std::vector<std::pair<std::uint32_t, float>> Elements::Diagonal(const ElasticMod
     add(binding.membrane, binding.stiffness, 1.0);
     for (std::size_t k = 0; k < 3; ++k) {
       add(binding.surface[k], binding.stiffness, -binding.barycentric[k]);
+    }
+  }
+  for (const ElasticHinge& attachment : model.attachments) {
+    for (std::size_t k = 0; k < 4; ++k) {
+      add(attachment.v[k], attachment.stiffness, attachment.c[k]);
     }
   }
   return diagonal;
@@ -255,7 +279,7 @@ void Elements::FindContacts(float h, const float* place, const float* start, con
 void Elements::LineariseBindings(const float* place) {
   for (const std::uint32_t i : computed_.bindings) {
     Element& e = bindings_[i];
-    const __m128 d = CombineBinding(e, place);
+    const __m128 d = _mm_sub_ps(CombineBinding(e, place), _mm_load_ps(binding_rest_[i].offset.data()));
     const float length = std::max(std::sqrt(_mm_cvtss_f32(Dot3(d, d))), kLeastBindingLength_m),
                 k = binding_rest_[i].stiffness;
     const float tension = k * (length - binding_rest_[i].length);
@@ -322,7 +346,7 @@ void Elements::Add(const Selection& selection, float* field) const {
 double Elements::EnergyOfBindingsAndContacts(const float* place, std::span<const ContactRow> contacts) const {
   double sum = guard_.Energy(place);
   for (const std::uint32_t i : computed_.bindings) {
-    const __m128 d = CombineBinding(bindings_[i], place);
+    const __m128 d = _mm_sub_ps(CombineBinding(bindings_[i], place), _mm_load_ps(binding_rest_[i].offset.data()));
     const float stretch = std::sqrt(_mm_cvtss_f32(Dot3(d, d))) - binding_rest_[i].length;
     sum += 0.5 * static_cast<double>(binding_rest_[i].stiffness * stretch * stretch);
   }

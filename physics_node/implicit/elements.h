@@ -122,8 +122,9 @@ class Elements {
 
  private:
   struct BindingRest {
-    float length, stiffness;  ///< [m], [N/m]
-    Index node;
+    float length, stiffness;                    ///< [m], [N/m]
+    Index node;                                 ///< Of the membrane; kNoIndex: none.
+    alignas(16) std::array<float, 4> offset{};  ///< Part of s that is no stretch [m].
   };
   /// What a binding does to one of its particles.
   struct Share {

@@ -41,7 +41,7 @@ InversionGuard::InversionGuard(const ElasticModel& model) {
     Vertices& vertices = tets_.emplace_back();
     std::copy(tet.v.begin(), tet.v.end(), vertices.begin());
     Shape& shape = shapes_.emplace_back();
-    shape.stiffness = static_cast<float>(kStiffnessOverShear * model.mu_Pa * tet.volume);
+    shape.stiffness = static_cast<float>(kStiffnessOverShear * tet.scale * model.mu_Pa * tet.volume);
     for (std::size_t k = 1; k < 4; ++k) {
       shape.gradient[k] = tet.inverse_edges.row(static_cast<Eigen::Index>(k) - 1).transpose().cast<float>();
       shape.gradient[0] -= shape.gradient[k];

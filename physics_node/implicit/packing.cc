@@ -28,6 +28,11 @@ std::vector<std::pair<ParticleRef, ParticleRef>> JoinedParticles(const ElasticMo
       joined.emplace_back(particles.Ref(binding.membrane), particles.Ref(v));
     }
   }
+  for (const ElasticHinge& attachment : model.attachments) {
+    for (std::size_t i = 1; i < attachment.v.size(); ++i) {
+      joined.emplace_back(particles.Ref(attachment.v[0]), particles.Ref(attachment.v[i]));
+    }
+  }
   return joined;
 }
 

@@ -81,8 +81,8 @@ XpbdSolver::XpbdSolver(const ElasticModel& model, const TissueModel* tissue, Par
         batch.inverse_edges[3 * row + col][lane] = static_cast<float>(inverse(row, col));
       }
     }
-    batch.mu[lane] = static_cast<float>(model.mu_Pa * tet.volume);
-    batch.lambda[lane] = static_cast<float>((model.lambda_Pa + model.mu_Pa) * tet.volume);
+    batch.mu[lane] = static_cast<float>(tet.scale * model.mu_Pa * tet.volume);
+    batch.lambda[lane] = static_cast<float>(tet.scale * (model.lambda_Pa + model.mu_Pa) * tet.volume);
   }
   for (std::size_t i = 0; i < model.hinges.size(); ++i) {
     const ElasticHinge& hinge = model.hinges[i];

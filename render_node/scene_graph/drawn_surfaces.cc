@@ -17,8 +17,8 @@
 namespace fulcrum::render {
 namespace {
 
-constexpr std::array<std::string_view, 10> kSurfaces{"rectum", "fat",     "membrane", "surroundings", "breathing",
-                                                     "hook",   "grasper", "jaw",      "blade",        "instrument"};
+constexpr std::array<std::string_view, 11> kSurfaces{
+    "rectum", "organ", "fat", "membrane", "surroundings", "breathing", "hook", "grasper", "jaw", "blade", "instrument"};
 
 class Collector final : public osg::NodeVisitor {
  public:

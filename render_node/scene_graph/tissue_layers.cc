@@ -31,6 +31,32 @@ Vec3f EyeOf(const Laparoscope& scope) {
 
 float PixelsPerRad(const Laparoscope& scope) { return scope.projection(1, 1) * scope.picture_centre.y(); }
 
+/// Linear colours between which the pattern of a solid varies, colour and share of the small vessels on it, patterns
+/// per metre, wetness. By SolidLook; chosen by eye.
+constexpr std::array<std::array<float, 12>, kSolidLooks> kLooks{{
+    {0.52f, 0.070f, 0.060f, 0.72f, 0.20f, 0.15f, 0.26f, 0.008f, 0.014f, 0.5f, 20.0f, 0.8f},    // bowel
+    {0.58f, 0.26f, 0.20f, 0.74f, 0.42f, 0.33f, 0.34f, 0.03f, 0.03f, 0.6f, 14.0f, 0.8f},        // bladder
+    {0.15f, 0.022f, 0.014f, 0.23f, 0.045f, 0.026f, 0.11f, 0.012f, 0.01f, 0.15f, 26.0f, 0.9f},  // liver
+    {0.16f, 0.23f, 0.13f, 0.34f, 0.38f, 0.20f, 0.24f, 0.05f, 0.03f, 0.5f, 16.0f, 0.9f},        // gallbladder
+    {0.66f, 0.40f, 0.10f, 0.84f, 0.60f, 0.22f, 0.45f, 0.06f, 0.03f, 0.3f, 40.0f, 0.8f},        // fat
+    {0.40f, 0.060f, 0.050f, 0.56f, 0.12f, 0.09f, 0.26f, 0.01f, 0.01f, 0.2f, 30.0f, 0.6f},      // muscle
+    {0.55f, 0.10f, 0.08f, 0.70f, 0.24f, 0.18f, 0.40f, 0.02f, 0.02f, 0.3f, 30.0f, 0.8f},        // artery
+    {0.22f, 0.08f, 0.14f, 0.34f, 0.14f, 0.20f, 0.16f, 0.03f, 0.08f, 0.3f, 30.0f, 0.8f},        // vein
+    {0.66f, 0.46f, 0.34f, 0.80f, 0.62f, 0.48f, 0.46f, 0.06f, 0.05f, 0.4f, 30.0f, 0.8f},        // ureter
+    {0.72f, 0.64f, 0.46f, 0.82f, 0.76f, 0.60f, 0.5f, 0.2f, 0.14f, 0.1f, 30.0f, 0.6f},          // nerve
+}};
+
+void SetLook(SolidLook look, osg::StateSet* state) {
+  const auto& v = kLooks[static_cast<std::size_t>(look)];
+  const auto colour = [&](std::size_t k) { return osg::Vec3(v[k], v[k + 1], v[k + 2]); };
+  state->addUniform(new osg::Uniform("dark", colour(0)));
+  state->addUniform(new osg::Uniform("light", colour(3)));
+  state->addUniform(new osg::Uniform("vessel_colour", colour(6)));
+  state->addUniform(new osg::Uniform("vessel_share", v[9]));
+  state->addUniform(new osg::Uniform("pattern_scale", v[10]));
+  state->addUniform(new osg::Uniform("wetness", v[11]));
+}
+
 }  // namespace
 
 TissueLayers::TissueLayers(const SceneView& scene, const Laparoscope& scope)
@@ -46,7 +72,7 @@ TissueLayers::TissueLayers(const SceneView& scene, const Laparoscope& scope)
   for (std::size_t i = 0; i < scene.rest_position.size(); ++i) {
     Eigen::Map<Vec3f>(xyz_.data() + 3 * i) = scene.rest_position[i];
   }
-  AddRectum();
+  AddSolids();
   AddSheets();
 }
 
@@ -57,32 +83,55 @@ void TissueLayers::Add(Layer* layer, const char* name, Order order, const char* 
   geode_->addDrawable(layer->mesh->geometry());
 }
 
-void TissueLayers::AddRectum() {
-  const std::size_t count = scene_.surface_vertices.size();
-  rectum_positions_.resize(count);
-  rectum_normals_.resize(count);
-  UpdateRectum();
-  // The pattern is fixed to the tissue: its coordinates are those at rest along the organ's three principal directions.
+void TissueLayers::AddSolids() {
+  solid_positions_.resize(scene_.surface_vertices.size());
+  solid_normals_.resize(scene_.surface_vertices.size());
+  UpdateSolids();
+  if (!scene_.solids.empty()) {
+    for (const Solid& solid : scene_.solids) AddSolid(solid);
+    return;
+  }
+  Solid whole{};
+  whole.surface_vertex_count = static_cast<Index>(scene_.surface_vertices.size());
+  whole.surface_triangle_count = static_cast<Index>(scene_.surface_triangles.size());
+  AddSolid(whole);
+}
+
+void TissueLayers::AddSolid(const Solid& solid) {
+  const std::span<const Vec3f> positions =
+      std::span(solid_positions_).subspan(solid.first_surface_vertex, solid.surface_vertex_count);
+  const std::span<const Vec3f> normals =
+      std::span(solid_normals_).subspan(solid.first_surface_vertex, solid.surface_vertex_count);
+  // The pattern is fixed to the tissue: its coordinates are those at rest along the solid's three principal directions.
   Vec3f mean = Vec3f::Zero();
-  for (const Vec3f& p : rectum_positions_) {
-    mean += p / static_cast<float>(count);
+  for (const Vec3f& p : positions) {
+    mean += p / static_cast<float>(positions.size());
   }
   Mat3f spread = Mat3f::Zero();
-  for (const Vec3f& p : rectum_positions_) {
+  for (const Vec3f& p : positions) {
     spread += (p - mean) * (p - mean).transpose();
   }
   const Mat3f axes = Eigen::SelfAdjointEigenSolver<Mat3f>(spread).eigenvectors();  // Ascending: the long axis is last.
-  std::vector<Float4> coordinates(count);
-  for (std::size_t k = 0; k < count; ++k) {
-    const Vec3f place = axes.transpose() * (rectum_positions_[k] - mean);
-    const Vec3f facing = axes.transpose() * rectum_normals_[k];
+  std::vector<Float4> coordinates(positions.size());
+  for (std::size_t k = 0; k < positions.size(); ++k) {
+    const Vec3f place = axes.transpose() * (positions[k] - mean);
+    const Vec3f facing = axes.transpose() * normals[k];
     const float front = facing[0] * facing[0], side = facing[1] * facing[1];
     coordinates[k] = {place[2], place[1], place[0], front + side > 0 ? front / (front + side) : 0.5f};
   }
-  Add(&rectum_, "rectum", Order::kRectum, "rectum.frag");
-  rectum_.mesh->state()->setAttributeAndModes(new osg::CullFace(osg::CullFace::BACK));
-  rectum_.mesh->state()->addUniform(new osg::Uniform("behind", kRectumBehind));
-  rectum_.mesh->SetCoordinates(coordinates);
+  SolidLayer& added = solids_.emplace_back();
+  added.first_vertex = solid.first_surface_vertex;
+  added.vertex_count = solid.surface_vertex_count;
+  for (const Triangle& t :
+       scene_.surface_triangles.subspan(solid.first_surface_triangle, solid.surface_triangle_count)) {
+    added.triangles.push_back({t[0] - added.first_vertex, t[1] - added.first_vertex, t[2] - added.first_vertex});
+  }
+  Add(&added.layer, solid.look == SolidLook::kBowel ? "rectum" : "organ", Order::kRectum, "rectum.frag");
+  osg::StateSet* state = added.layer.mesh->state();
+  state->setAttributeAndModes(new osg::CullFace(osg::CullFace::BACK));
+  state->addUniform(new osg::Uniform("behind", kRectumBehind));
+  SetLook(solid.look, state);
+  added.layer.mesh->SetCoordinates(coordinates);
 }
 
 void TissueLayers::AddSheets() {
@@ -172,18 +221,23 @@ bool TissueLayers::Update() {
   UpdateMembrane();
   UpdateFat();
   if (tissue_changed_ || scope_changed_) {
-    UpdateRectum();
-    rectum_.mesh->SetPositions(rectum_positions_);
-    rectum_.mesh->SetNormals(rectum_normals_);
-    Show(&rectum_, rectum_positions_, scene_.surface_triangles, Sides::kFront);
+    UpdateSolids();
+    for (SolidLayer& solid : solids_) {
+      const auto own = [&](const std::vector<Vec3f>& all) {
+        return std::span(all).subspan(solid.first_vertex, solid.vertex_count);
+      };
+      solid.layer.mesh->SetPositions(own(solid_positions_));
+      solid.layer.mesh->SetNormals(own(solid_normals_));
+      Show(&solid.layer, own(solid_positions_), solid.triangles, Sides::kFront);
+    }
   }
   tissue_changed_ = topology_changed_ = scope_changed_ = false;
   return true;
 }
 
-void TissueLayers::UpdateRectum() {
-  MapEmbedded(scene_.tets, scene_.surface_vertices, xyz_, rectum_positions_);
-  ComputeNormals(rectum_positions_, scene_.surface_triangles, rectum_normals_);
+void TissueLayers::UpdateSolids() {
+  MapEmbedded(scene_.tets, scene_.surface_vertices, xyz_, solid_positions_);
+  ComputeNormals(solid_positions_, scene_.surface_triangles, solid_normals_);
 }
 
 void TissueLayers::UpdateMembrane() {

@@ -49,11 +49,18 @@ class TissueLayers {
   };
   void Add(Layer* layer, const char* name, Order order, const char* fragment, const char* defined = "");
   void Show(Layer* layer, std::span<const Vec3f> positions, std::span<const Triangle> triangles, Sides sides);
-  void AddRectum();
+  /// The visible surface of a solid.
+  struct SolidLayer {
+    Layer layer;
+    Index first_vertex, vertex_count;
+    std::vector<Triangle> triangles;  ///< Of its own vertices.
+  };
+  void AddSolids();
+  void AddSolid(const Solid& solid);
   void AddSheets();
   /// Adds the planned line of an exercise to the membrane.
   void AddPlannedLine();
-  void UpdateRectum();
+  void UpdateSolids();
   void UpdateMembrane();
   void UpdateFat();
 
@@ -66,14 +73,15 @@ class TissueLayers {
   SheetDetail detail_;
   FatLayer fat_;
   std::vector<float> xyz_;
-  std::vector<Vec3f> rectum_positions_, rectum_normals_;
+  std::vector<Vec3f> solid_positions_, solid_normals_;  ///< Of all solids.
   std::vector<Triangle> fat_shown_;
   std::vector<float> fat_bared_;
   std::vector<Triangle> chosen_;  // Scratch: triangles of the membrane at the level of detail that is needed.
   const std::vector<float> rim_;  // Per node of the membrane's grid (geometry/sheet_rim.h).
   bool tissue_changed_ = true, topology_changed_ = true, scope_changed_ = true;
   osg::ref_ptr<osg::Geode> geode_ = new osg::Geode;
-  Layer rectum_, fat_layer_, sheet_;
+  std::vector<SolidLayer> solids_;
+  Layer fat_layer_, sheet_;
 };
 
 }  // namespace fulcrum::render

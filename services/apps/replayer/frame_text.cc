@@ -71,7 +71,8 @@ std::string CalibrationText(const render::Pinhole& camera, double baseline_m) {
   for (int k = 0; k < kTruthClasses; ++k) {
     text += Format("%s\"%s\"", k > 0 ? ", " : "", NameOf(static_cast<TruthClass>(k)));
   }
-  return text + Format("],\n  \"first_tool_instance\": %d\n}\n", kFirstToolInstance);
+  return text + Format("],\n  \"first_tool_instance\": %d,\n  \"first_organ_instance\": %d\n}\n", kFirstToolInstance,
+                       kFirstOrganInstance);
 }
 
 FrameState::FrameState(const render::RenderNode& node, const ContactModel& contacts)

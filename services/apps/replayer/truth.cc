@@ -44,6 +44,7 @@ TruthClass ClassOfSurface(const DrawnSurface& surface, const std::array<ToolKind
                                          : TruthClass::kGrasper;
   }
   if (surface.name == "rectum") return TruthClass::kRectum;
+  if (surface.name == "organ") return TruthClass::kOrgan;
   if (surface.name == "fat") return TruthClass::kFat;
   return surface.name == "membrane" ? TruthClass::kMembrane : TruthClass::kSurroundings;
 }
@@ -51,12 +52,12 @@ TruthClass ClassOfSurface(const DrawnSurface& surface, const std::array<ToolKind
 }  // namespace
 
 const char* NameOf(TruthClass what) {
-  constexpr std::array<const char*, kTruthClasses> kNames{"none",     "surroundings", "rectum", "fat",
-                                                          "membrane", "grasper",      "hook",   "scissors"};
+  constexpr std::array<const char*, kTruthClasses> kNames{"none",    "surroundings", "rectum",   "fat",  "membrane",
+                                                          "grasper", "hook",         "scissors", "organ"};
   return kNames[static_cast<std::size_t>(what)];
 }
 
-bool IsTool(TruthClass what) { return what >= TruthClass::kGrasper; }
+bool IsTool(TruthClass what) { return what >= TruthClass::kGrasper && what <= TruthClass::kScissors; }
 
 Moment::Moment(render::LaparoscopeView* view, const render::Laparoscope& from, const SceneView& scene, int columns,
                int rows)
@@ -158,8 +159,11 @@ TruthClass Truth::ClassOf(const Hit& hit) const {
 }
 
 int Truth::InstanceOf(const Hit& hit) const {
-  const int tool = hit.any() ? surfaces_[static_cast<std::size_t>(hit.surface)].tool : -1;
-  return tool >= 0 ? kFirstToolInstance + tool : static_cast<int>(ClassOf(hit));
+  if (!hit.any()) return 0;
+  const DrawnSurface& surface = surfaces_[static_cast<std::size_t>(hit.surface)];
+  if (surface.tool >= 0) return kFirstToolInstance + surface.tool;
+  const TruthClass what = ClassOf(hit);
+  return what == TruthClass::kOrgan ? kFirstOrganInstance + surface.part : static_cast<int>(what);
 }
 
 Vec3d Truth::PointOf(const Hit& hit) const {

@@ -24,14 +24,15 @@ enum class TruthClass : std::uint8_t {
   kMembrane,
   kGrasper,
   kHook,
-  kScissors
+  kScissors,
+  kOrgan  ///< A solid that is no bowel.
 };
-inline constexpr int kTruthClasses = 8;
+inline constexpr int kTruthClasses = 9;
 [[nodiscard]] const char* NameOf(TruthClass what);
 [[nodiscard]] bool IsTool(TruthClass what);
 
-/// Instances: a tissue's is its class, tool k's is kFirstToolInstance + k.
-inline constexpr int kFirstToolInstance = 16;
+/// Instances: a tissue's is its class, tool k's is kFirstToolInstance + k, the k-th organ's kFirstOrganInstance + k.
+inline constexpr int kFirstToolInstance = 16, kFirstOrganInstance = 32;
 
 inline constexpr double kDepthUnit_m = 2e-5;        ///< Of a depth image; 0: nothing.
 inline constexpr double kFlowUnit_px = 1.0 / 64;    ///< Of a flow image, whose zero is 32768.

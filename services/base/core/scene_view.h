@@ -147,6 +147,40 @@ struct Binding {
   float rest_length;  ///< [m]
 };
 
+/// What a solid looks like.
+enum class SolidLook : std::uint32_t {
+  kBowel,
+  kBladder,
+  kLiver,
+  kGallbladder,
+  kFat,
+  kMuscle,
+  kArtery,
+  kVein,
+  kUreter,
+  kNerve
+};
+inline constexpr std::uint32_t kSolidLooks = 10;
+
+/// One of several deformable bodies: ranges of the organ's vertices, surface_vertices and surface_triangles.
+struct Solid {
+  char name[32];
+  SolidLook look;
+  float youngs_modulus_Pa;  ///< Poisson's ratio is that of the scene.
+  Index first_vertex, vertex_count;
+  Index first_surface_vertex, surface_vertex_count;
+  Index first_surface_triangle, surface_triangle_count;
+};
+
+/// The tissue that joins two solids: a spring from a vertex of one to a point of a surface triangle of another, of the
+/// same stiffness in every direction, without force in the rest shape.
+struct Attachment {
+  Index vertex;
+  Triangle surface;
+  std::array<float, 3> barycentric;
+  float stiffness_N_per_m;
+};
+
 /// A vertex of the high-resolution rectum surface, carried by one tetrahedron of the tube.
 struct EmbeddedVertex {
   Index tetrahedron;
@@ -271,6 +305,10 @@ struct TissueScene : SheetScene {
   std::span<const Binding> bindings;
   std::span<const Index> binding_colours;
   std::span<const Triangle> tube_surface;  ///< Outer surface of the tets, outward.
+  /// In order of their vertices, of which each belongs to one solid. Empty: all is one organ, with the modulus of
+  /// `physics`.
+  std::span<const Solid> solids;
+  std::span<const Attachment> attachments;  ///< Of mode accurate.
 
   std::span<const StaticSurface> static_surfaces;
   std::span<const Vec3f> static_vertices;

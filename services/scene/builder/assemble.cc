@@ -7,6 +7,7 @@
 
 #include "services/base/core/error.h"
 #include "services/base/core/scope.h"
+#include "services/base/core/solids.h"
 #include "services/scene/builder/build.h"
 #include "services/scene/builder/flatten.h"
 #include "services/scene/builder/geometry.h"
@@ -67,7 +68,8 @@ class Sheet {
 
 void CheckCounts(const SceneSettings& settings, const Anatomy& anatomy) {
   const MembraneSettings& m = settings.membrane;
-  const std::size_t total = anatomy.organ_vertices.size() + anatomy.sheet.size();
+  std::size_t total = anatomy.sheet.size();
+  for (const SolidBody& body : anatomy.solids) total += body.vertices.size();
   if (m.rows < 3 || m.cols < 3 || anatomy.sheet.size() != static_cast<std::size_t>(m.rows) * m.cols) {
     Refuse(settings, "the membrane needs at least 3 x 3 nodes");
   }
@@ -111,19 +113,26 @@ std::vector<Vec2f> MaterialOf(const SceneSettings& settings, const std::vector<V
 
 void AddParticles(const SceneSettings& settings, const Anatomy& anatomy, SceneData* scene) {
   const int rows = settings.membrane.rows, cols = settings.membrane.cols;
-  const std::size_t organ_count = anatomy.organ_vertices.size();
+  const std::size_t organ_count = scene->fixed.tube_vertex_count;
   std::vector<double> mass(organ_count + anatomy.sheet.size(), 0.0);
-  for (std::size_t i = 0; i < anatomy.tets.size(); ++i) {
-    const Tetrahedron& t = anatomy.tets[i];
-    const auto& x = anatomy.organ_vertices;
-    const double volume = SignedVolume(x[t[0]], x[t[1]], x[t[2]], x[t[3]]);
-    if (!(volume > 0)) {
-      Refuse(settings, "tetrahedron " + std::to_string(i) + " has no positive volume");
+  std::vector<bool> held;
+  for (const SolidBody& body : anatomy.solids) {
+    const std::size_t first = held.size();
+    for (std::size_t i = 0; i < body.tets.size(); ++i) {
+      const Tetrahedron& t = body.tets[i];
+      const auto& x = body.vertices;
+      const double volume = SignedVolume(x[t[0]], x[t[1]], x[t[2]], x[t[3]]);
+      if (!(volume > 0)) {
+        Refuse(settings, body.name + ": tetrahedron " + std::to_string(i) + " has no positive volume");
+      }
+      for (const Index v : t) {
+        mass[first + v] += body.material.density_kg_m3 * volume / 4;
+      }
     }
-    for (const Index v : t) {
-      mass[v] += settings.organ_density_kg_m3 * volume / 4;
-    }
+    held.insert(held.end(), body.fixed.begin(), body.fixed.end());
+    for (const Vec3d& p : body.vertices) scene->rest_position.push_back(p.cast<float>());
   }
+  for (const Vec3d& p : anatomy.sheet) scene->rest_position.push_back(p.cast<float>());
   for (int r = 0; r + 1 < rows; ++r) {
     for (int c = 0; c + 1 < cols; ++c) {
       const std::size_t n00 = static_cast<std::size_t>(r) * cols + c;
@@ -136,17 +145,11 @@ void AddParticles(const SceneSettings& settings, const Anatomy& anatomy, SceneDa
       }
     }
   }
-  scene->rest_position.reserve(mass.size());
-  for (const auto* points : {&anatomy.organ_vertices, &anatomy.sheet}) {
-    for (const Vec3d& p : *points) {
-      scene->rest_position.push_back(p.cast<float>());
-    }
-  }
   scene->inverse_mass.resize(mass.size());
   for (std::size_t i = 0; i < mass.size(); ++i) {
     bool fixed = false;
     if (i < organ_count) {
-      fixed = anatomy.organ_fixed[i];
+      fixed = held[i];
     } else {
       const auto r = static_cast<int>((i - organ_count) / cols), c = static_cast<int>((i - organ_count) % cols);
       fixed = r == 0 || r == rows - 1 || c == 0 || c == cols - 1;
@@ -162,23 +165,64 @@ double RestLength(const SceneData& scene, Index a, Index b) {
   return (scene.rest_position[a].cast<double>() - scene.rest_position[b].cast<double>()).norm();
 }
 
-void AddOrgan(const Anatomy& anatomy, SceneData* scene) {
-  // Sorted before the embedding, because surface vertices refer to their tetrahedron by its index.
-  scene->tets = anatomy.tets;
-  scene->tet_colours =
-      SortByColour(&scene->tets, anatomy.organ_vertices.size(), [](const Tetrahedron& t) { return ParticlesOf(t); });
-  scene->tube_surface = BoundaryOf(anatomy.tets);
-  for (const auto& [a, b] : EdgesOf(anatomy.tets)) {
-    scene->tube_edges.push_back({a, b, static_cast<float>(RestLength(*scene, a, b))});
+/// The visible surface of a solid whose vertices begin at `first`, carried by its own tetrahedra.
+void Embed(const SolidBody& body, Index first, const std::vector<Vec3d>& vertices, SceneData* scene) {
+  std::vector<Tetrahedron> own;
+  std::vector<Index> at;
+  for (Index i = 0; i < scene->tets.size(); ++i) {
+    if (scene->tets[i][0] >= first && scene->tets[i][0] - first < body.vertices.size()) {
+      own.push_back(scene->tets[i]);
+      at.push_back(i);
+    }
   }
-  scene->surface_triangles = anatomy.surface_triangles;
-  for (const Embedding& e : EmbedPoints(anatomy.organ_vertices, scene->tets, anatomy.surface_vertices)) {
-    EmbeddedVertex vertex{e.tetrahedron, {}};
+  const auto base = static_cast<Index>(scene->surface_vertices.size());
+  for (const Triangle& t : body.surface_triangles) {
+    scene->surface_triangles.push_back({t[0] + base, t[1] + base, t[2] + base});
+  }
+  for (const Embedding& e : EmbedPoints(vertices, own, body.surface_vertices)) {
+    EmbeddedVertex vertex{at[e.tetrahedron], {}};
     for (int k = 0; k < 4; ++k) {
       vertex.barycentric[k] = static_cast<float>(e.barycentric[k]);
     }
     scene->surface_vertices.push_back(vertex);
   }
+}
+
+/// Returns the vertices of all solids, in double.
+std::vector<Vec3d> AddSolids(const Anatomy& anatomy, SceneData* scene) {
+  std::vector<Vec3d> vertices;
+  for (const SolidBody& body : anatomy.solids) {
+    const auto first = static_cast<Index>(vertices.size());
+    for (const Tetrahedron& t : body.tets)
+      scene->tets.push_back({t[0] + first, t[1] + first, t[2] + first, t[3] + first});
+    vertices.insert(vertices.end(), body.vertices.begin(), body.vertices.end());
+  }
+  // Before the tetrahedra are sorted by colour.
+  scene->tube_surface = BoundaryOf(scene->tets);
+  for (const auto& [a, b] : EdgesOf(scene->tets)) {
+    scene->tube_edges.push_back({a, b, static_cast<float>(RestLength(*scene, a, b))});
+  }
+  // And these before the embedding, because surface vertices refer to their tetrahedron by its index.
+  scene->tet_colours = SortByColour(&scene->tets, vertices.size(), [](const Tetrahedron& t) { return ParticlesOf(t); });
+  // One organ that looks like bowel is what a scene without a list of solids has.
+  const bool is_listed = anatomy.solids.size() > 1 || anatomy.solids[0].material.look != SolidLook::kBowel;
+  Index first = 0;
+  for (const SolidBody& body : anatomy.solids) {
+    Solid solid{};
+    std::strncpy(solid.name, body.name.c_str(), sizeof(solid.name) - 1);
+    solid.look = body.material.look;
+    solid.youngs_modulus_Pa = static_cast<float>(body.material.youngs_modulus_Pa);
+    solid.first_vertex = first;
+    solid.vertex_count = static_cast<Index>(body.vertices.size());
+    solid.first_surface_vertex = static_cast<Index>(scene->surface_vertices.size());
+    solid.surface_vertex_count = static_cast<Index>(body.surface_vertices.size());
+    solid.first_surface_triangle = static_cast<Index>(scene->surface_triangles.size());
+    solid.surface_triangle_count = static_cast<Index>(body.surface_triangles.size());
+    Embed(body, first, vertices, scene);
+    first += solid.vertex_count;
+    if (is_listed) scene->solids.push_back(solid);
+  }
+  return vertices;
 }
 
 void AddMembrane(const SceneSettings& settings, SceneData* scene) {
@@ -219,9 +263,10 @@ void AddMembrane(const SceneSettings& settings, SceneData* scene) {
   }
 }
 
-void AddBindings(const SceneSettings& settings, const Anatomy& anatomy, SceneData* scene) {
+void AddBindings(const SceneSettings& settings, const Anatomy& anatomy, const std::vector<Vec3d>& organ_vertices,
+                 SceneData* scene) {
   const MembraneSettings& m = settings.membrane;
-  const TriangleLocator locator(anatomy.organ_vertices, scene->tube_surface);
+  const TriangleLocator locator(organ_vertices, scene->tube_surface);
   for (int r = m.binding_row_stride / 2; r < m.rows; r += m.binding_row_stride) {
     for (int c = m.binding_col_stride / 2 + 1; c < m.cols; c += m.binding_col_stride) {
       const std::size_t i = static_cast<std::size_t>(r) * m.cols + c;
@@ -241,6 +286,48 @@ void AddBindings(const SceneSettings& settings, const Anatomy& anatomy, SceneDat
     std::ostringstream text;
     text << "no membrane node lies within binding_reach = " << 1e3 * m.binding_reach_m << " mm of the organ";
     Refuse(settings, text.str());
+  }
+}
+
+/// Springs from every vertex of a body's surface to the nearest point of another one within reach: a column of tissue
+/// over the vertex's share of the surface, as long as the distance.
+void AddAttachments(const SceneSettings& settings, const Anatomy& anatomy, const std::vector<Vec3d>& vertices,
+                    SceneData* scene) {
+  constexpr double kLeastLength_m = 1e-3;  // Of the column, where bodies touch.
+  const std::vector<Index> solid = SolidOfVertices(scene->View());
+  const auto find = [&](const std::string& name) {
+    const auto at = std::ranges::find(anatomy.solids, name, &SolidBody::name);
+    if (at == anatomy.solids.end()) Refuse(settings, "attach: no body '" + name + "'");
+    return static_cast<Index>(at - anatomy.solids.begin());
+  };
+  for (const AttachSettings& attach : settings.attach) {
+    const Index from = find(attach.from), to = find(attach.to);
+    std::vector<Triangle> surface;
+    std::vector<double> area(vertices.size());
+    for (const Triangle& t : scene->tube_surface) {
+      if (solid[t[0]] == to) surface.push_back(t);
+      if (solid[t[0]] != from) continue;
+      const Vec3d &a = vertices[t[0]], &b = vertices[t[1]], &c = vertices[t[2]];
+      for (const Index v : t) area[v] += (b - a).cross(c - a).norm() / 6;
+    }
+    const std::size_t before = scene->attachments.size();
+    const TriangleLocator locator(vertices, surface);
+    for (Index v = 0; v < vertices.size(); ++v) {
+      if (!(area[v] > 0)) continue;
+      const auto hit = locator.Closest(vertices[v], attach.reach_m);
+      if (hit.triangle == kNoIndex) continue;
+      Attachment a{v, surface[hit.triangle], {}, 0};
+      for (int k = 0; k < 3; ++k) a.barycentric[k] = static_cast<float>(hit.closest.barycentric[k]);
+      a.stiffness_N_per_m =
+          static_cast<float>(attach.youngs_modulus_Pa * area[v] / std::max(hit.closest.distance, kLeastLength_m));
+      scene->attachments.push_back(a);
+    }
+    if (scene->attachments.size() == before) {
+      std::ostringstream text;
+      text << "attach: no vertex of '" << attach.from << "' lies within " << 1e3 * attach.reach_m << " mm of '"
+           << attach.to << "'; raise reach_mm, or move the bodies";
+      Refuse(settings, text.str());
+    }
   }
 }
 
@@ -361,15 +448,16 @@ SceneData AssembleScene(const SceneSettings& settings, const Anatomy& anatomy) {
   fixed.assessment = settings.assessment;
   fixed.tools = settings.tools;
   fixed.node_mask = settings.node_mask;
-  fixed.tube_vertex_count = static_cast<Index>(anatomy.organ_vertices.size());
+  for (const SolidBody& body : anatomy.solids) fixed.tube_vertex_count += static_cast<Index>(body.vertices.size());
   fixed.membrane.first = fixed.tube_vertex_count;
   fixed.membrane.rows = static_cast<std::uint32_t>(settings.membrane.rows);
   fixed.membrane.cols = static_cast<std::uint32_t>(settings.membrane.cols);
 
   AddParticles(settings, anatomy, &scene);
-  AddOrgan(anatomy, &scene);
+  const std::vector<Vec3d> vertices = AddSolids(anatomy, &scene);
   AddMembrane(settings, &scene);
-  AddBindings(settings, anatomy, &scene);
+  AddBindings(settings, anatomy, vertices, &scene);
+  AddAttachments(settings, anatomy, vertices, &scene);
   scene.membrane_material = MaterialOf(settings, anatomy.sheet);
   AddSurroundings(anatomy, &scene);
   const Sheet sheet(settings.membrane, anatomy.sheet, scene.membrane_material);

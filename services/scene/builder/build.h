@@ -6,19 +6,27 @@
 
 namespace fulcrum::scene {
 
-/// Builds the procedural scene that `settings` (without `import`) describes. Throws InputError when the settings do not
-/// give a scene: too many vertices, a sheet larger than the atlas, an inverted tetrahedron, a script out of reach.
+/// Builds the procedural scene that `settings` (without `import` and `bodies`) describes. Throws InputError when the
+/// settings do not give a scene: too many vertices, a sheet larger than the atlas, an inverted tetrahedron, a script
+/// out of reach.
 SceneData BuildProcedural(const SceneSettings& settings);
 
-/// The organ and its surroundings, procedural or imported.
-struct Anatomy {
-  std::vector<Vec3d> organ_vertices;
+/// A deformable body of tetrahedra, and its visible surface.
+struct SolidBody {
+  std::string name;
+  Material material;
+  std::vector<Vec3d> vertices;
   std::vector<Tetrahedron> tets;
-  std::vector<bool> organ_fixed;        ///< [organ_vertices]
+  std::vector<bool> fixed;              ///< [vertices]
   std::vector<Vec3d> surface_vertices;  ///< High-resolution surface, to be embedded.
   std::vector<Triangle> surface_triangles;
-  std::vector<Vec3d> sheet;  ///< Membrane nodes, row by row.
-  bool is_patch = false;     ///< The sheet covers a patch, not a stretch of a tube.
+};
+
+/// The bodies and their surroundings, procedural or imported.
+struct Anatomy {
+  std::vector<SolidBody> solids;  ///< The first is the organ under the membrane.
+  std::vector<Vec3d> sheet;       ///< Membrane nodes, row by row.
+  bool is_patch = false;          ///< The sheet covers a patch, not a stretch of a tube.
   struct Surrounding {
     std::string name;
     SurfaceRole role;
@@ -29,7 +37,14 @@ struct Anatomy {
   std::vector<Surrounding> surroundings;
 };
 
-/// Masses, constraints, colours, bindings, embedding, material coordinates, structures and script over an anatomy.
+/// The organ with the density and stiffness of the settings, still without shape.
+SolidBody OrganOf(const SceneSettings& settings);
+
+/// Anatomy of a procedural scene, without `bodies`.
+Anatomy ProceduralAnatomy(const SceneSettings& settings);
+
+/// Masses, constraints, colours, bindings, attachments, embedding, material coordinates, structures and script over an
+/// anatomy.
 SceneData AssembleScene(const SceneSettings& settings, const Anatomy& anatomy);
 
 }  // namespace fulcrum::scene

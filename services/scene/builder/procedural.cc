@@ -125,7 +125,7 @@ void SplitInFive(int parity, const Add& add) {
   add(middle);
 }
 
-void AddTube(const TubeSettings& tube, const Shape& shape, Anatomy* out) {
+void AddTube(const TubeSettings& tube, const Shape& shape, SolidBody* out) {
   const int n = tube.segments;
   const auto id = [&](int ring, int segment, int layer) {
     return static_cast<Index>((ring * 2 + layer) * n + segment % n);
@@ -133,9 +133,9 @@ void AddTube(const TubeSettings& tube, const Shape& shape, Anatomy* out) {
   for (int ring = 0; ring < tube.rings; ++ring) {
     for (int layer = 0; layer < 2; ++layer) {
       for (int segment = 0; segment < n; ++segment) {
-        out->organ_vertices.push_back(shape.Organ(static_cast<double>(ring) / (tube.rings - 1), 2 * kPi * segment / n,
-                                                  layer == 0 ? tube.wall_m : 0));
-        out->organ_fixed.push_back(ring == 0 || ring == tube.rings - 1);
+        out->vertices.push_back(shape.Organ(static_cast<double>(ring) / (tube.rings - 1), 2 * kPi * segment / n,
+                                            layer == 0 ? tube.wall_m : 0));
+        out->fixed.push_back(ring == 0 || ring == tube.rings - 1);
       }
     }
   }
@@ -146,7 +146,7 @@ void AddTube(const TubeSettings& tube, const Shape& shape, Anatomy* out) {
         for (std::size_t k = 0; k < 4; ++k) {
           tet[k] = id(ring + corners[k][0], segment + corners[k][1], corners[k][2]);
         }
-        const auto& x = out->organ_vertices;
+        const auto& x = out->vertices;
         if (SignedVolume(x[tet[0]], x[tet[1]], x[tet[2]], x[tet[3]]) < 0) {
           std::swap(tet[2], tet[3]);
         }
@@ -157,7 +157,7 @@ void AddTube(const TubeSettings& tube, const Shape& shape, Anatomy* out) {
   }
 }
 
-void AddFineSurface(const TubeSettings& tube, const Shape& shape, Anatomy* out) {
+void AddFineSurface(const TubeSettings& tube, const Shape& shape, SolidBody* out) {
   const int rings = (tube.rings - 1) * kSurfaceRefinement + 1, n = tube.segments * kSurfaceRefinement;
   for (int ring = 0; ring < rings; ++ring) {
     for (int segment = 0; segment < n; ++segment) {
@@ -267,22 +267,34 @@ Anatomy::Surrounding AbdominalWall() {
 
 }  // namespace
 
-SceneData BuildProcedural(const SceneSettings& settings) {
-  if (settings.import) {
-    throw InputError("scene '" + settings.name + "': an imported organ is not procedural");
-  }
+SolidBody OrganOf(const SceneSettings& settings) {
+  SolidBody organ;
+  organ.name = "organ";
+  organ.material = {settings.organ_look, settings.physics.tube_youngs_modulus_Pa, settings.organ_density_kg_m3};
+  return organ;
+}
+
+Anatomy ProceduralAnatomy(const SceneSettings& settings) {
   if (settings.tube.split == BrickSplit::kFive && settings.tube.segments % 2 != 0) {
     throw InputError("scene '" + settings.name + "': " + std::to_string(settings.tube.segments) +
                      " segments; valid with a split in five: an even number");
   }
   const Shape shape(settings.tube, settings.membrane);
   Anatomy anatomy;
-  AddTube(settings.tube, shape, &anatomy);
-  AddFineSurface(settings.tube, shape, &anatomy);
+  SolidBody& organ = anatomy.solids.emplace_back(OrganOf(settings));
+  AddTube(settings.tube, shape, &organ);
+  AddFineSurface(settings.tube, shape, &organ);
   AddSheet(settings.membrane, shape, &anatomy);
   anatomy.surroundings = {Retroperitoneum(settings.tube, settings.membrane, shape),
                           PelvicFloor(settings.tube, settings.membrane, shape), AbdominalWall()};
-  return AssembleScene(settings, anatomy);
+  return anatomy;
+}
+
+SceneData BuildProcedural(const SceneSettings& settings) {
+  if (settings.import || !settings.bodies.empty()) {
+    throw InputError("scene '" + settings.name + "': an imported organ and further bodies are not procedural");
+  }
+  return AssembleScene(settings, ProceduralAnatomy(settings));
 }
 
 }  // namespace fulcrum::scene

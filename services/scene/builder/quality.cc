@@ -165,6 +165,11 @@ std::string Describe(const SceneView& s, const SceneQuality& q) {
     text += '\n';
   };
   add("  vertices   %zu: organ %zu, membrane %u x %u", q.vertices, q.organ_vertices, s.membrane.rows, s.membrane.cols);
+  for (const Solid& solid : s.solids) {
+    add("  body       %s: %u vertices, %.3g kPa", solid.name, solid.vertex_count,
+        1e-3 * static_cast<double>(solid.youngs_modulus_Pa));
+  }
+  if (!s.attachments.empty()) add("  attached   by %zu springs", s.attachments.size());
   add("  stretch    %zu: organ %zu, membrane %zu (and %zu bindings)", q.organ_springs + q.membrane_springs,
       q.organ_springs, q.membrane_springs, q.bindings);
   add("  volume     %zu tetrahedra, %.1f ml", q.tets, 1e6 * q.organ_volume_m3);

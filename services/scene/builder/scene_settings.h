@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "services/base/core/scene_view.h"
+#include "services/scene/builder/materials.h"
 #include "services/scene/builder/operator_hand.h"
 
 namespace fulcrum::scene {
@@ -33,15 +34,26 @@ struct TubeSettings {
 };
 
 inline constexpr int kMostSurroundings = 16;  ///< Of an imported organ.
+inline constexpr int kMostBodies = 24;        ///< Beside the organ.
+
+/// A body of simple shape: an ellipsoid, or what a circle sweeps along a smooth curve, rounded at both ends.
+struct ShapeSettings {
+  std::optional<Vec3f> radii_m;    ///< Semi-axes of an ellipsoid; not set: swept.
+  Vec3f at_m = Vec3f::Zero();      ///< Middle of the ellipsoid.
+  Vec3f turn_rad = Vec3f::Zero();  ///< Of the ellipsoid, about x, then y, then z.
+  std::vector<Vec3f> line_m;       ///< Points of the curve.
+  std::vector<double> radius_m;    ///< At each of them.
+};
 
 /// The organ read from a mesh: its tetrahedra unchanged, or a surface that is filled with tetrahedra (without `wall_m`
 /// wall and lumen are one body). The membrane covers a stretch of the organ's centre line, on the side from which it is
 /// dissected, or a patch of its surface. Without `centreline_m` the importer finds line or patch, and the middle of the
 /// membrane becomes the origin of frame W.
 struct ImportSettings {
-  double scale_m = 0.001;          ///< Metres per unit of the files.
-  Vec3f origin_m = Vec3f::Zero();  ///< Point in the frame of the files that becomes the origin of frame W.
-  std::filesystem::path organ_file;
+  double scale_m = 0.001;            ///< Metres per unit of the files.
+  Vec3f origin_m = Vec3f::Zero();    ///< Point in the frame of the files that becomes the origin of frame W.
+  std::filesystem::path organ_file;  ///< Empty: `shape`.
+  ShapeSettings shape;
   bool remesh = false;        ///< Fill the surface of a file's tetrahedra with new ones.
   bool cap_openings = false;  ///< Close an open surface with caps.
   double wall_m = 0;          ///< > 0: hollow, with a wall of this thickness below the surface; openings stay open.
@@ -54,6 +66,7 @@ struct ImportSettings {
   bool patch = false;                            ///< The membrane covers a patch, whether or not the organ is a tube.
   std::optional<Vec3f> patch_at_m;               ///< Its middle, in the frame of the files; none: found.
   double patch_width_m = 0, patch_length_m = 0;  ///< 0: most of the organ as seen from outside.
+  double held_share = 0.35;  ///< Under a patch the organ is fixed on its far side, over this share of its height.
   /// The stretch under the membrane, as fractions of the centre line's length; beyond it the organ is fixed.
   double from = 0.1, to = 0.9;
   /// Direction from the organ to the middle of the membrane, in the frame of the files; none: found, or z with a given
@@ -72,6 +85,29 @@ struct ImportSettings {
     bool collides = false;
   };
   std::vector<Surrounding> surroundings;
+};
+
+/// A further deformable body, in the frame in which the organ is described: that of the files of `import`, else W.
+struct BodySettings {
+  std::string name;
+  Material material;
+  std::filesystem::path file;  ///< Surface or tetrahedra, in the unit and from the origin of `import`; empty: `shape`.
+  Vec3f offset_m = Vec3f::Zero();
+  ShapeSettings shape;
+  bool is_tube = false;       ///< `shape` is swept and thin: hexagonal rings around its line.
+  double tet_edge_m = 0.006;  ///< Mean edge of the tetrahedra; of a tube, distance of the rings.
+  int surface_triangles_max = 4000;
+  /// Fixed on this side over this share of its extent; none: not fixed by itself.
+  std::optional<Vec3f> held_side;
+  double held_share = 0.35;
+  bool first_end_held = false, last_end_held = false;  ///< Of a tube.
+};
+
+/// Where two bodies are nearer than `reach_m` they are joined by tissue.
+struct AttachSettings {
+  std::string from, to;  ///< Names of bodies; `organ` is the one under the membrane.
+  double reach_m = 0.004;
+  double youngs_modulus_Pa = 3e3;
 };
 
 /// The membrane's dynamic layer. Columns run across the organ (coordinate s, +x), rows along it (coordinate t, +y).
@@ -130,8 +166,11 @@ struct SceneSettings {
   HapticsParams haptics;
   Breathing breathing;
   double organ_density_kg_m3 = 1050;
+  SolidLook organ_look = SolidLook::kBowel;
   TubeSettings tube;  ///< Used without `import`.
   std::optional<ImportSettings> import;
+  std::vector<BodySettings> bodies;
+  std::vector<AttachSettings> attach;
   MembraneSettings membrane;
   std::vector<StructureSettings> structures;
   std::array<ToolDescription, kMaxTools> tools{};

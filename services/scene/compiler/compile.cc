@@ -1,6 +1,7 @@
 #include "services/scene/compiler/compile.h"
 
 #include "services/scene/builder/build.h"
+#include "services/scene/compiler/bodies.h"
 #include "services/scene/compiler/import.h"
 #include "services/scene/compiler/scene_yaml.h"
 #include "services/scene/compiler/tool_meshes.h"
@@ -8,8 +9,14 @@
 namespace fulcrum::scene {
 
 SceneData BuildScene(const SceneSettings& settings, const Progress& progress) {
-  SceneData scene =
-      settings.import ? AssembleScene(settings, ImportAnatomy(settings, progress)) : BuildProcedural(settings);
+  Anatomy anatomy;
+  if (settings.import) {
+    anatomy = ImportAnatomy(settings, progress);
+  } else {
+    anatomy = ProceduralAnatomy(settings);
+    AddBodies(settings, {}, progress, &anatomy);
+  }
+  SceneData scene = AssembleScene(settings, anatomy);
   AddToolMeshes(settings, &scene);
   return scene;
 }

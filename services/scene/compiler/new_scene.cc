@@ -61,7 +61,10 @@ void ChooseMembrane(const SheetSize& size, MembraneSettings* m) {
 
 /// Everything that a shaft or a line of sight can meet.
 std::vector<Vec3d> ObstaclesOf(const Anatomy& anatomy) {
-  std::vector<Vec3d> obstacles = anatomy.organ_vertices;
+  std::vector<Vec3d> obstacles;
+  for (const SolidBody& body : anatomy.solids) {
+    obstacles.insert(obstacles.end(), body.vertices.begin(), body.vertices.end());
+  }
   obstacles.insert(obstacles.end(), anatomy.sheet.begin(), anatomy.sheet.end());
   for (const Anatomy::Surrounding& s : anatomy.surroundings) {
     obstacles.insert(obstacles.end(), s.vertices.begin(), s.vertices.end());
@@ -294,7 +297,7 @@ std::string DescribeNewScene(const NewScene& given, const Progress& progress) {
   ChooseMembrane(size, &settings.membrane);
 
   double radius = 0;
-  for (const Vec3d& p : anatomy.organ_vertices) radius = std::max(radius, p.norm());
+  for (const Vec3d& p : anatomy.solids[0].vertices) radius = std::max(radius, p.norm());
   import.cavity_m = std::max(0.085, 1.15 * radius);
   const Vec3d scope = 1e3 * Trocar(ScopeDistance(size) * kScopeDirection, Vec3d::Zero(), kScope, obstacles);
   const Vec3d grasper = 1e3 * Trocar(Vec3d(-0.085, -0.045, 0.092), Vec3d(-0.01, 0, 0), kShaft, obstacles);

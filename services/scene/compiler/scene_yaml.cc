@@ -6,6 +6,7 @@
 
 #include "services/base/core/scope.h"
 #include "services/scene/compiler/changes.h"
+#include "services/scene/compiler/yaml_bodies.h"
 #include "services/scene/compiler/yaml_parameters.h"
 
 namespace fulcrum::scene {
@@ -100,6 +101,7 @@ void ReadPatch(StrictMap map, ImportSettings* import) {
   if (map.Has("at_mm")) import->patch_at_m = map.Vector3Si("at_mm", Range::Between(-5000, 5000));
   if (map.Has("width_mm")) import->patch_width_m = map.NumberSi("width_mm", Range::Between(5, 400));
   if (map.Has("length_mm")) import->patch_length_m = map.NumberSi("length_mm", Range::Between(5, 400));
+  ReadSi(&map, "held_share", Range::Between(0, 0.95), &import->held_share);
 }
 
 void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Folders* folders) {
@@ -110,7 +112,13 @@ void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Fol
   import->scale_m =
       map.Choice("unit", import->scale_m, kLengthUnits) * map.Number("scale", 1, Range::Between(1e-3, 1e3));
   import->origin_m = map.Vector3Si("origin_mm", import->origin_m, Range::Between(-2000, 2000));
-  import->organ_file = FindFile(map, "organ", map.Text("organ"), *folders);
+  map.KeepNearer("organ", "shape");
+  if (auto shape = map.OptionalMap("shape")) {
+    if (map.Has("organ")) map.Fail("shape", "and organ exclude each other");
+    import->shape = ReadShape(*shape);
+  } else {
+    import->organ_file = FindFile(map, "organ", map.Text("organ"), *folders);
+  }
   import->remesh = map.Flag("remesh", import->remesh);
   import->cap_openings = map.Flag("cap_openings", import->cap_openings);
   ReadSi(&map, "wall_mm", Range::Between(0, 30), &import->wall_m);
@@ -312,6 +320,7 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesys
   scene.description = root.TextOr("description", "");
   StrictMap organ = root.Map("organ");
   ReadSi(&organ, "density_kg_m3", Range::Between(1, 1e5), &scene.organ_density_kg_m3);
+  scene.organ_look = organ.Choice("look", scene.organ_look, kSolidLookNames);
   organ.KeepNearer("import", "procedural");
   if (organ.Has("import") == organ.Has("procedural")) {
     root.Fail("organ", "needs either `procedural` or `import`");
@@ -327,6 +336,10 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesys
     ReadTube(organ.Map("procedural"), &scene.tube);
     folders.insert(folders.end(), bases.begin(), bases.end());
   }
+  const auto find = [&](const StrictMap& map, const std::string& key) {
+    return FindFile(map, key, StrictMap(map).Text(key), folders);
+  };
+  ReadBodies(&root, find, &scene);
   ReadMembrane(root.MapOrDefaults("membrane"), &scene.membrane);
   for (StrictMap& entry : root.Maps("structures", 0, kMaxStructures)) {
     scene.structures.push_back(ReadStructure(entry));

@@ -16,6 +16,8 @@ SceneView SceneData::View() const {
   view.bindings = bindings;
   view.binding_colours = binding_colours;
   view.tube_surface = tube_surface;
+  view.solids = solids;
+  view.attachments = attachments;
   view.surface_vertices = surface_vertices;
   view.surface_triangles = surface_triangles;
   view.membrane_material = membrane_material;

@@ -140,10 +140,15 @@ struct Payload {
 
 std::uint64_t ContentHash(const SceneView& view) {
   Hash64 hash;
-  hash.AddValue(kSceneFileVersion);
+  hash.AddValue(kSceneContentVersion);
   const FixedPart fixed = ToFixed(view);
   hash.Add(std::as_bytes(std::span(&fixed, 1)));
-  ForEachSection(view, [&](const char*, auto& span) { hash.Add(std::as_bytes(span)); });
+  const auto add = [&](const char*, auto& span) { hash.Add(std::as_bytes(span)); };
+  ForEachUsualSection(view, add);
+  // A scene without them keeps the hash that it had before there were any.
+  ForEachBodySection(view, [&](const char* name, auto& span) {
+    if (!span.empty()) add(name, span);
+  });
   return hash.value();
 }
 

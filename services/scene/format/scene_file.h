@@ -11,7 +11,9 @@
 
 namespace fulcrum::scene {
 
-inline constexpr std::uint32_t kSceneFileVersion = 11;
+inline constexpr std::uint32_t kSceneFileVersion = 12;
+/// Version of what the content hash is taken of; another one changes the hash of every scene.
+inline constexpr std::uint32_t kSceneContentVersion = 11;
 
 /// Owns the arrays of a scene under construction or in a test; `View()` is what nodes read.
 struct SceneData {
@@ -28,6 +30,8 @@ struct SceneData {
   std::vector<Binding> bindings;
   std::vector<Index> binding_colours;
   std::vector<Triangle> tube_surface;
+  std::vector<Solid> solids;
+  std::vector<Attachment> attachments;
   std::vector<EmbeddedVertex> surface_vertices;
   std::vector<Triangle> surface_triangles;
   std::vector<Vec2f> membrane_material;

@@ -5,9 +5,16 @@
 
 namespace fulcrum::scene {
 
-/// Calls visit(name, span) for every array of the view (const or not). Names have at most 23 characters.
+/// Those of scenes with several solids.
 template <class View, class Visitor>
-void ForEachSection(View& view, Visitor&& visit) {
+void ForEachBodySection(View& view, Visitor&& visit) {
+  visit("solids", view.solids);
+  visit("attachments", view.attachments);
+}
+
+/// Those of every scene.
+template <class View, class Visitor>
+void ForEachUsualSection(View& view, Visitor&& visit) {
   visit("rest_position", view.rest_position);
   visit("inverse_mass", view.inverse_mass);
   visit("tets", view.tets);
@@ -33,6 +40,13 @@ void ForEachSection(View& view, Visitor&& visit) {
   visit("tool_triangles", view.tool_triangles);
   visit("script", view.script);
   visit("planned_line", view.planned_line);
+}
+
+/// Calls visit(name, span) for every array of the view (const or not). Names have at most 23 characters.
+template <class View, class Visitor>
+void ForEachSection(View& view, Visitor&& visit) {
+  ForEachUsualSection(view, visit);
+  ForEachBodySection(view, visit);
 }
 
 }  // namespace fulcrum::scene

@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "services/base/core/solids.h"
 #include "services/scene/format/validate_checks.h"
 
 namespace fulcrum::scene {
@@ -150,6 +151,67 @@ void CheckSurfaces(const SceneView& s) {
   }
 }
 
+/// Each element within one solid, each solid a range after the last one.
+void CheckSolids(const SceneView& s) {
+  if (s.solids.empty() && s.attachments.empty()) return;
+  std::uint64_t vertex = 0, surface_vertex = 0, surface_triangle = 0;
+  const auto follow = [](std::size_t solid, const char* what, std::uint64_t first, std::uint64_t count,
+                         std::uint64_t* end) {
+    if (first != *end) Fail("solids", "element ", solid, ": its ", what, " begin at ", first, "; valid: ", *end);
+    *end += count;
+  };
+  for (std::size_t i = 0; i < s.solids.size(); ++i) {
+    const Solid& solid = s.solids[i];
+    follow(i, "vertices", solid.first_vertex, solid.vertex_count, &vertex);
+    follow(i, "surface vertices", solid.first_surface_vertex, solid.surface_vertex_count, &surface_vertex);
+    follow(i, "surface triangles", solid.first_surface_triangle, solid.surface_triangle_count, &surface_triangle);
+    CheckRange("solids", "Young's modulus", i, solid.youngs_modulus_Pa, 1, 1e9);
+    if (std::memchr(solid.name, 0, sizeof(solid.name)) == nullptr ||
+        static_cast<std::uint32_t>(solid.look) >= kSolidLooks) {
+      Fail("solids", "element ", i, ": bad name or look");
+    }
+  }
+  if (!s.solids.empty()) {
+    CheckSize("solids", vertex, s.tube_vertex_count);
+    CheckSize("solids", surface_vertex, s.surface_vertices.size());
+    CheckSize("solids", surface_triangle, s.surface_triangles.size());
+  }
+  const std::vector<Index> of = SolidOfVertices(s);
+  const auto one_solid = [&](const char* section, std::size_t element, const auto& vertices) {
+    for (const Index v : vertices) {
+      if (of[v] != of[vertices[0]]) Fail(section, "element ", element, ": in two solids");
+    }
+  };
+  for (std::size_t i = 0; i < s.tets.size(); ++i) one_solid("tets", i, s.tets[i]);
+  for (std::size_t i = 0; i < s.tube_edges.size(); ++i) one_solid("tube_edges", i, ParticlesOf(s.tube_edges[i]));
+  for (std::size_t i = 0; i < s.tube_surface.size(); ++i) one_solid("tube_surface", i, s.tube_surface[i]);
+  for (std::size_t i = 0; i < s.solids.size(); ++i) {
+    const Solid& solid = s.solids[i];
+    const Index first = solid.first_surface_vertex, end = first + solid.surface_vertex_count;
+    for (Index v = first; v < end; ++v) {
+      if (of[s.tets[s.surface_vertices[v].tetrahedron][0]] != i) {
+        Fail("surface_vertices", "element ", v, ": carried by another solid");
+      }
+    }
+    for (Index t = solid.first_surface_triangle; t < solid.first_surface_triangle + solid.surface_triangle_count; ++t) {
+      for (const Index v : s.surface_triangles[t]) CheckIndex("surface_triangles", t, v, first, end);
+    }
+  }
+  for (std::size_t i = 0; i < s.attachments.size(); ++i) {
+    const Attachment& a = s.attachments[i];
+    CheckIndex("attachments", i, a.vertex, 0, s.tube_vertex_count);
+    for (const Index v : a.surface) CheckIndex("attachments", i, v, 0, s.tube_vertex_count);
+    CheckDistinct("attachments", i, a.surface);
+    one_solid("attachments", i, a.surface);
+    if (of[a.vertex] == of[a.surface[0]]) Fail("attachments", "element ", i, ": joins a solid with itself");
+    CheckWeights("attachments", i, a.barycentric);
+    CheckRange("attachments", "stiffness", i, a.stiffness_N_per_m, 0, 1e6);
+  }
+  if (!s.attachments.empty() && s.physics.mode != PhysicsMode::kAccurate) {
+    Fail("attachments", s.attachments.size(), " of them; valid in another mode than accurate: none");
+  }
+}
+
 void CheckToolMeshes(const SceneView& s) {
   for (std::size_t i = 0; i < s.tool_vertices.size(); ++i) {
     CheckPoint("tool_vertices", i, s.tool_vertices[i]);
@@ -229,6 +291,7 @@ std::optional<SceneFault> FindFault(const SceneView& scene) {
     CheckParticles(scene);
     CheckConstraints(scene);
     CheckSurfaces(scene);
+    CheckSolids(scene);
     CheckToolMeshes(scene);
     CheckStructuresAndScript(scene);
   } catch (const Fault& fault) {

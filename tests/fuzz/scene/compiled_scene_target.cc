@@ -62,10 +62,13 @@ void Reseal(Bytes* file) {
   };
   // As ContentHash, over the bytes.
   Hash64 content;
-  content.AddValue(scene::kSceneFileVersion);
+  content.AddValue(scene::kSceneContentVersion);
   content.Add(named("scene"));
   SceneView view;
-  scene::ForEachSection(view, [&](const char* name, auto&) { content.Add(named(name)); });
+  scene::ForEachUsualSection(view, [&](const char* name, auto&) { content.Add(named(name)); });
+  scene::ForEachBodySection(view, [&](const char* name, auto&) {
+    if (!named(name).empty()) content.Add(named(name));
+  });
   for (const Section& section : sections) {
     Hash64 hash;
     hash.Add(section.bytes);

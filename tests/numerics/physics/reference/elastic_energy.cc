@@ -93,6 +93,7 @@ Points RestPoints(const ElasticModel& model) {
 }
 
 ElasticEnergy::ElasticEnergy(ElasticModel model) : model_(std::move(model)), triangles_of_(TrianglesOfEdges(model_)) {
+  model_.hinges.insert(model_.hinges.end(), model_.attachments.begin(), model_.attachments.end());
   for (const ElasticSpring& spring : model_.springs) {
     whole_axial_.push_back(spring.axial);
   }

@@ -1,0 +1,24 @@
+// From a description of a body - mesh file or shape - to its tetrahedra and its visible surface.
+#pragma once
+
+#include <string>
+
+#include "services/scene/builder/scene_settings.h"
+#include "services/scene/compiler/compile.h"
+#include "services/scene/compiler/tetrahedralise.h"
+
+namespace fulcrum::scene {
+
+struct FilledBody {
+  TetrahedralMesh tets;
+  TriangleMesh surface;
+};
+
+/// Tetrahedra of a file, repaired, or those that fill its surface or the shape, in the frame of the files [m]. Throws
+/// InputError "name: reason".
+FilledBody FillBody(const ImportSettings& import, const std::string& name, const Progress& progress);
+
+/// From the files' unit and origin to metres.
+void ToMetres(const ImportSettings& import, const Vec3f& offset_m, std::vector<Vec3d>* points);
+
+}  // namespace fulcrum::scene

@@ -1,0 +1,125 @@
+#include "services/scene/compiler/yaml_bodies.h"
+
+#include <array>
+#include <set>
+
+#include "services/scene/compiler/yaml_parameters.h"
+
+namespace fulcrum::scene {
+namespace {
+
+using config::Range;
+using config::StrictMap;
+
+constexpr std::size_t kMostPoints = 64;
+constexpr std::size_t kMostAttachments = 64;
+
+enum class Ends { kNone, kFirst, kLast, kBoth };
+const StrictMap::Choices<Ends> kEnds = {
+    {"none", Ends::kNone}, {"first", Ends::kFirst}, {"last", Ends::kLast}, {"both", Ends::kBoth}};
+
+void ReadSwept(StrictMap* map, ShapeSettings* shape) {
+  std::array<std::vector<double>, 3> axes;
+  const std::array keys = {"x_mm", "y_mm", "z_mm"};
+  for (std::size_t k = 0; k < 3; ++k) {
+    axes[k] = map->NumbersSi(keys[k], 2, kMostPoints, Range::Between(-5000, 5000));
+    if (axes[k].size() != axes[0].size()) map->Fail(keys[k], "must have as many entries as x_mm");
+  }
+  for (std::size_t i = 0; i < axes[0].size(); ++i) {
+    shape->line_m.push_back(Eigen::Vector3d(axes[0][i], axes[1][i], axes[2][i]).cast<float>());
+    if (i > 0 && !((shape->line_m[i] - shape->line_m[i - 1]).norm() > 1e-4f)) {
+      map->Fail("x_mm", "two points that follow each other are less than 0.1 mm apart");
+    }
+  }
+  shape->radius_m = map->NumbersSi("radius_mm", 1, kMostPoints, Range::Between(0.3, 200));
+  if (shape->radius_m.size() == 1) shape->radius_m.resize(axes[0].size(), shape->radius_m[0]);
+  if (shape->radius_m.size() != axes[0].size()) map->Fail("radius_mm", "must have one entry, or as many as x_mm");
+}
+
+Material ReadMaterial(StrictMap* map) {
+  const std::string name = map->Text("material", 31);
+  const NamedMaterial* named = FindMaterial(name);
+  if (named == nullptr) {
+    std::string valid;
+    for (const NamedMaterial& m : Materials()) valid += (valid.empty() ? "" : ", ") + std::string(m.name);
+    map->Fail("material", "'" + name + "' is not one of " + valid);
+  }
+  Material material = named->material;
+  material.look = map->Choice("look", material.look, kSolidLookNames);
+  ReadSi(map, "youngs_modulus_kPa", Range::Between(0.001, 1e6), &material.youngs_modulus_Pa);
+  ReadSi(map, "density_kg_m3", Range::Between(1, 1e5), &material.density_kg_m3);
+  return material;
+}
+
+BodySettings ReadBody(StrictMap map, const FindMesh& find) {
+  BodySettings body;
+  body.name = map.Text("name", 31);
+  body.material = ReadMaterial(&map);
+  const int sources = (map.Has("mesh") ? 1 : 0) + (map.Has("shape") ? 1 : 0) + (map.Has("tube") ? 1 : 0);
+  if (sources != 1) map.Fail("name", "needs one of `mesh`, `shape` and `tube`");
+  if (map.Has("mesh")) body.file = find(map, "mesh");
+  if (auto shape = map.OptionalMap("shape")) body.shape = ReadShape(*shape);
+  if (auto tube = map.OptionalMap("tube")) {
+    body.is_tube = true;
+    ReadSwept(&*tube, &body.shape);
+    body.tet_edge_m = 2 * body.shape.radius_m[0];
+  }
+  body.offset_m = map.Vector3Si("offset_mm", body.offset_m, Range::Between(-1000, 1000));
+  ReadSi(&map, "tet_edge_mm", Range::Between(0.5, 50), &body.tet_edge_m);
+  ReadInteger(&map, "triangles_max", 100, 100000, &body.surface_triangles_max);
+  if (body.is_tube) {
+    const Ends held = map.Choice("held_ends", Ends::kNone, kEnds);
+    body.first_end_held = held == Ends::kFirst || held == Ends::kBoth;
+    body.last_end_held = held == Ends::kLast || held == Ends::kBoth;
+  } else if (map.Has("held_side")) {
+    body.held_side = map.Vector3Si("held_side", Range::Between(-1, 1));
+    if (!(body.held_side->norm() > 0.1f)) map.Fail("held_side", "must be a direction, not (nearly) zero");
+    body.held_side->normalize();
+    ReadSi(&map, "held_share", Range::Between(0.01, 0.95), &body.held_share);
+  }
+  return body;
+}
+
+}  // namespace
+
+const StrictMap::Choices<SolidLook> kSolidLookNames = {
+    {"bowel", SolidLook::kBowel},   {"bladder", SolidLook::kBladder},
+    {"liver", SolidLook::kLiver},   {"gallbladder", SolidLook::kGallbladder},
+    {"fat", SolidLook::kFat},       {"muscle", SolidLook::kMuscle},
+    {"artery", SolidLook::kArtery}, {"vein", SolidLook::kVein},
+    {"ureter", SolidLook::kUreter}, {"nerve", SolidLook::kNerve}};
+
+ShapeSettings ReadShape(StrictMap map) {
+  ShapeSettings shape;
+  if (!map.Has("ellipsoid_mm")) {
+    ReadSwept(&map, &shape);
+    return shape;
+  }
+  shape.radii_m = map.Vector3Si("ellipsoid_mm", Range::Between(1, 500));
+  shape.at_m = map.Vector3Si("at_mm", shape.at_m, Range::Between(-5000, 5000));
+  const std::vector<double> turn = map.NumbersSi("turn_deg", {0, 0, 0}, 3, 3, Range::Between(-180, 180));
+  shape.turn_rad = Eigen::Vector3d(turn[0], turn[1], turn[2]).cast<float>();
+  return shape;
+}
+
+void ReadBodies(StrictMap* root, const FindMesh& find, SceneSettings* scene) {
+  std::set<std::string> names{"organ"};
+  for (StrictMap& entry : root->Maps("bodies", 0, kMostBodies)) {
+    scene->bodies.push_back(ReadBody(entry, find));
+    if (!names.insert(scene->bodies.back().name).second) entry.Fail("name", "is there twice");
+  }
+  for (StrictMap& entry : root->Maps("attach", 0, kMostAttachments)) {
+    AttachSettings attach;
+    attach.from = entry.Text("from", 31);
+    attach.to = entry.Text("to", 31);
+    for (const auto& [key, name] : {std::pair{"from", attach.from}, std::pair{"to", attach.to}}) {
+      if (!names.contains(name)) entry.Fail(key, "'" + name + "' is no body of this scene, nor `organ`");
+    }
+    if (attach.from == attach.to) entry.Fail("to", "must be another body");
+    ReadSi(&entry, "reach_mm", Range::Between(0.1, 50), &attach.reach_m);
+    ReadSi(&entry, "youngs_modulus_kPa", Range::Between(0.001, 1e4), &attach.youngs_modulus_Pa);
+    scene->attach.push_back(attach);
+  }
+}
+
+}  // namespace fulcrum::scene

@@ -1,0 +1,25 @@
+// Reading the deformable bodies of a scene description: shapes, `bodies`, `attach`.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "services/base/config/strict_yaml.h"
+#include "services/scene/builder/scene_settings.h"
+
+namespace fulcrum::scene {
+
+/// Choices of the key `look`.
+extern const config::StrictMap::Choices<SolidLook> kSolidLookNames;
+
+/// `ellipsoid_mm`, or `x_mm`, `y_mm`, `z_mm` and `radius_mm`. Throws InputError, as all functions here.
+ShapeSettings ReadShape(config::StrictMap map);
+
+/// Path of the file that a key names.
+using FindMesh = std::function<std::filesystem::path(const config::StrictMap&, const std::string& key)>;
+
+/// `bodies` and `attach` of a description.
+void ReadBodies(config::StrictMap* root, const FindMesh& find, SceneSettings* scene);
+
+}  // namespace fulcrum::scene

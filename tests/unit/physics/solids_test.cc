@@ -1,0 +1,129 @@
+// Several solids in one scene: stiffness of their own, contact with each other, what joins them, sleep, determinism.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "physics_node/energy/elastic_model.h"
+#include "physics_node/simulation/tissue_simulation.h"
+#include "tests/support/several_solids.h"
+
+namespace fulcrum::physics {
+namespace {
+
+const Vec3f kEarth(0, 0, -9.81f);
+constexpr Index kPad = 1, kLump = 2, kStrand = 3;
+
+class OnSeveralSolids : public testing::Test {
+ protected:
+  explicit OnSeveralSolids(const Vec3f& gravity = Vec3f::Zero()) : data_(SeveralSolids(gravity)) {}
+
+  [[nodiscard]] Vec3f MeanOf(const TissueSimulation& simulation, Index solid) const {
+    const Solid& s = scene_.solids[solid];
+    Vec3f sum = Vec3f::Zero();
+    for (Index v = s.first_vertex; v < s.first_vertex + s.vertex_count; ++v) sum += At(simulation, v);
+    return sum / static_cast<float>(s.vertex_count);
+  }
+  /// Height of the lowest vertex.
+  [[nodiscard]] float Bottom(const TissueSimulation& simulation, Index solid) const {
+    const Solid& s = scene_.solids[solid];
+    float low = 1;
+    for (Index v = s.first_vertex; v < s.first_vertex + s.vertex_count; ++v) {
+      low = std::min(low, At(simulation, v).z());
+    }
+    return low;
+  }
+  [[nodiscard]] static Vec3f At(const TissueSimulation& simulation, Index v) {
+    return simulation.particles().At(simulation.particles().Ref(v));
+  }
+
+  scene::SceneData data_;
+  SceneView scene_ = data_.View();
+};
+
+class UnderGravity : public OnSeveralSolids {
+ protected:
+  UnderGravity() : OnSeveralSolids(kEarth) {}
+};
+
+TEST_F(OnSeveralSolids, HaveTheModulusOfTheirOwn) {
+  const ElasticModel model = BuildElasticModel(scene_);
+  const double organ_Pa = scene_.physics.tube_youngs_modulus_Pa;
+  for (const ElasticTet& tet : model.tets) {
+    const auto solid = std::ranges::find_if(scene_.solids, [&](const Solid& s) {
+      return tet.v[0] >= s.first_vertex && tet.v[0] < s.first_vertex + s.vertex_count;
+    });
+    ASSERT_NE(solid, scene_.solids.end());
+    EXPECT_NEAR(tet.scale * organ_Pa, static_cast<double>(solid->youngs_modulus_Pa), 1);
+  }
+  EXPECT_GT(model.attachments.size(), 3u);
+}
+
+TEST_F(OnSeveralSolids, StayAtRestAndSleep) {
+  TissueSimulation simulation(scene_);
+  int steps = 0;
+  while (!simulation.Step({}).asleep && steps < 200) ++steps;
+  EXPECT_LT(steps, 100);
+  EXPECT_LT(simulation.MaxDisplacement(), 1e-5f);
+  EXPECT_EQ(simulation.quarantined(), 0u);
+}
+
+TEST_F(UnderGravity, ALooseOneFallsOntoAnotherAndLiesThere) {
+  TissueSimulation simulation(scene_);
+  const float pad = Bottom(simulation, kPad) + 0.015f;
+  for (int i = 0; i < 300; ++i) simulation.Step({});
+  // A lump of 8 g: it sinks in by the softness of the contact and of the pad.
+  EXPECT_GT(Bottom(simulation, kLump), pad - 0.003f);
+  EXPECT_LT(Bottom(simulation, kLump), pad + 0.001f);
+  EXPECT_NEAR(MeanOf(simulation, kLump).x(), 0.14f, 0.002f);
+  EXPECT_EQ(simulation.quarantined(), 0u);
+  float most = 0;
+  for (int i = 0; i < 50; ++i) most = std::max(most, simulation.Step({}).max_step_m);
+  EXPECT_LT(most, 2e-4f) << "it still moves";
+}
+
+TEST_F(UnderGravity, WhatJoinsTwoHoldsTheLighterOne) {
+  scene::SceneData loose = data_;
+  loose.attachments.clear();
+  const SceneView without = loose.View();
+  TissueSimulation joined(scene_), apart(without);
+  for (int i = 0; i < 200; ++i) {
+    joined.Step({});
+    apart.Step({});
+  }
+  const Index end = scene_.solids[kStrand].first_vertex;  // Beside the pad.
+  const float fall = scene_.rest_position[end].z() - At(joined, end).z();
+  EXPECT_LT(fall, 0.0015f);
+  EXPECT_GT(scene_.rest_position[end].z() - At(apart, end).z(), 3 * fall + 0.001f);
+}
+
+TEST_F(OnSeveralSolids, PushOneAnotherAway) {
+  TissueSimulation simulation(scene_);
+  // A grasper presses the lump down onto the pad.
+  std::array<ToolInput, kMaxTools> tools{};
+  tools[0].present = true;
+  const Vec3f before = MeanOf(simulation, kPad);
+  for (int i = 0; i < 150; ++i) {
+    tools[0].pose.p_WT = Vec3f(0.14f, 0, 0.05f - 0.0002f * static_cast<float>(std::min(i, 120)));
+    tools[0].pose.jaw_rad = 0;
+    simulation.Step(tools);
+  }
+  EXPECT_LT(MeanOf(simulation, kPad).z(), before.z() - 1e-5f) << "the pad was pressed through the lump";
+  // Pressed in by a third of its height, the pad still carries the lump.
+  const Index middle = scene_.solids[kPad].first_vertex + (3 * 9 + 4) * 9 + 4;
+  EXPECT_LT(At(simulation, middle).z(), 0.0125f);
+  EXPECT_GT(Bottom(simulation, kLump), At(simulation, middle).z() - 0.0025f);
+  EXPECT_EQ(simulation.quarantined(), 0u);
+}
+
+TEST_F(UnderGravity, AreTheSameOnAnyNumberOfThreads) {
+  TissueSimulation one(scene_, 1), three(scene_, 3);
+  three.LetThreadsHelp(true);
+  for (int i = 0; i < 80; ++i) {
+    one.Step({});
+    three.Step({});
+    ASSERT_EQ(one.StateHash(), three.StateHash()) << "step " << i;
+  }
+}
+
+}  // namespace
+}  // namespace fulcrum::physics

@@ -1,0 +1,196 @@
+// Scenes with several deformable bodies: shapes, tubes, what joins them, materials, and what is refused.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <numbers>
+
+#include "services/base/core/error.h"
+#include "services/base/core/solids.h"
+#include "services/scene/builder/geometry.h"
+#include "services/scene/compiler/compile.h"
+#include "services/scene/compiler/scene_yaml.h"
+#include "services/scene/compiler/shapes.h"
+#include "services/scene/compiler/tetrahedralise.h"
+#include "services/scene/format/validate.h"
+
+namespace fulcrum::scene {
+namespace {
+
+/// The small scene with these further lines.
+SceneSettings SmallWith(const std::string& lines) {
+  return ParseSceneYaml(
+             "name: several\norgan: {procedural: {rings: 22, segments: 10, length_mm: 100}}\n"
+             "membrane: {rows: 41, cols: 22}\nphysics: {mode: accurate}\n" +
+                 lines,
+             "x.yaml", {})
+      .settings;
+}
+
+std::string RefusalOf(const std::string& lines) {
+  try {
+    (void)BuildScene(SmallWith(lines), {});
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+constexpr const char* kBodies =
+    "bodies:\n"
+    "  - {name: lobe, material: liver, shape: {ellipsoid_mm: [15, 20, 10], at_mm: [0, 0, 60]}, tet_edge_mm: 7,\n"
+    "     held_side: [0, 0, 1]}\n"
+    "  - {name: duct, material: bile_duct, look: vein, tube: {x_mm: [0, 5, 0], y_mm: [21, 40, 60],\n"
+    "     z_mm: [60, 62, 70], radius_mm: [2, 1.5, 1]}, held_ends: last}\n"
+    "attach: [{from: duct, to: lobe, reach_mm: 3, youngs_modulus_kPa: 20}]\n";
+
+TEST(Bodies, AreRangesOfOneMesh) {
+  const SceneData data = BuildScene(SmallWith(kBodies), {});
+  const SceneView scene = data.View();
+  EXPECT_FALSE(FindFault(scene));
+  ASSERT_EQ(scene.solids.size(), 3u);
+  EXPECT_STREQ(scene.solids[0].name, "organ");
+  EXPECT_STREQ(scene.solids[1].name, "lobe");
+  EXPECT_EQ(scene.solids[1].look, SolidLook::kLiver);
+  EXPECT_EQ(scene.solids[2].look, SolidLook::kVein);
+  EXPECT_FLOAT_EQ(scene.solids[1].youngs_modulus_Pa, 5400);
+  // Only the upper part of the lobe and the last ring of the duct are fixed.
+  const Solid &lobe = scene.solids[1], &duct = scene.solids[2];
+  int held = 0;
+  for (Index v = lobe.first_vertex; v < lobe.first_vertex + lobe.vertex_count; ++v) {
+    const bool upper = scene.rest_position[v].z() > 0.063f;
+    EXPECT_EQ(scene.inverse_mass[v] == 0, upper) << scene.rest_position[v].z();
+    held += upper ? 1 : 0;
+  }
+  EXPECT_GT(held, 10);
+  for (Index v = duct.first_vertex; v < duct.first_vertex + duct.vertex_count; ++v) {
+    EXPECT_EQ(scene.inverse_mass[v] == 0, v + 7 >= duct.first_vertex + duct.vertex_count);
+  }
+  // The duct begins a millimetre beside the lobe.
+  EXPECT_GT(scene.attachments.size(), 3u);
+  for (const Attachment& a : scene.attachments) {
+    EXPECT_GE(a.vertex, duct.first_vertex);
+    EXPECT_LT(scene.rest_position[a.vertex].y(), 0.03f);
+    EXPECT_GT(a.stiffness_N_per_m, 0);
+  }
+}
+
+TEST(Bodies, AreWrittenAndReadAgain) {
+  const SceneData data = BuildScene(SmallWith(kBodies), {});
+  const auto file = std::filesystem::temp_directory_path() / ("bodies." + std::to_string(getpid()));
+  const std::uint64_t hash = WriteSceneFile(data, "", file);
+  const SceneFile read(file);
+  EXPECT_EQ(read.view().hash, hash);
+  EXPECT_EQ(read.view().solids.size(), 3u);
+  EXPECT_EQ(read.view().attachments.size(), data.attachments.size());
+  SceneData other = data;
+  other.solids[1].youngs_modulus_Pa *= 2;
+  EXPECT_NE(ContentHash(other.View()), hash);
+  std::filesystem::remove(file);
+}
+
+TEST(Bodies, OneOrganNeedsNoList) {
+  const SceneData data = BuildScene(SmallWith(""), {});
+  EXPECT_TRUE(data.solids.empty());
+  EXPECT_TRUE(data.attachments.empty());
+  EXPECT_EQ(SolidCount(data.View()), 1u);
+  SceneSettings liver = SmallWith("");
+  liver.organ_look = SolidLook::kLiver;
+  EXPECT_EQ(BuildScene(liver, {}).solids.size(), 1u);
+}
+
+TEST(Bodies, ATubeFollowsItsLine) {
+  ShapeSettings shape;
+  shape.line_m = {Vec3f(0, 0, 0), Vec3f(0.03f, 0, 0.01f), Vec3f(0.06f, 0.02f, 0)};
+  shape.radius_m = {0.003, 0.002, 0.001};
+  const TubeBody tube = TubeOfShape(shape, 0.004);
+  double volume = 0;
+  for (const Tetrahedron& t : tube.tets.tets) {
+    const auto& x = tube.tets.vertices;
+    const double v = SignedVolume(x[t[0]], x[t[1]], x[t[2]], x[t[3]]);
+    EXPECT_GT(v, 0);
+    volume += v;
+  }
+  // Each face belongs to one or two tetrahedra, and what the surface encloses is what they fill.
+  const TriangleMesh boundary{tube.tets.vertices, BoundaryOf(tube.tets.tets)};
+  EXPECT_NEAR(EnclosedVolume(boundary), volume, 1e-12);
+  EXPECT_NEAR(EnclosedVolume(tube.surface) / volume, std::numbers::pi / (1.5 * std::sqrt(3.0)), 0.08);
+}
+
+TEST(Bodies, ASweptShapeIsClosedAndRound) {
+  ShapeSettings shape;
+  shape.line_m = {Vec3f(0, 0, 0), Vec3f(0, 0.05f, 0)};
+  shape.radius_m = {0.01, 0.01};
+  const double round = std::numbers::pi * (0.01 * 0.01 * 0.05 + 4.0 / 3 * 1e-6);
+  EXPECT_NEAR(EnclosedVolume(SurfaceOfShape(shape)), round, 0.02 * round);
+  shape.radii_m = Vec3f(0.02f, 0.03f, 0.01f);
+  shape.turn_rad = Vec3f(0.3f, -0.4f, 1.0f);
+  const double ellipsoid = 4.0 / 3 * std::numbers::pi * 6e-6;
+  EXPECT_NEAR(EnclosedVolume(SurfaceOfShape(shape)), ellipsoid, 0.02 * ellipsoid);
+}
+
+TEST(Bodies, MaterialsNameTheirSource) {
+  for (const NamedMaterial& m : Materials()) {
+    EXPECT_EQ(FindMaterial(m.name), &m);
+    EXPECT_LE(m.least_Pa, m.material.youngs_modulus_Pa);
+    EXPECT_GE(m.most_Pa, m.material.youngs_modulus_Pa);
+    EXPECT_GT(m.source.size(), 10u);
+  }
+  EXPECT_EQ(FindMaterial("cheese"), nullptr);
+}
+
+struct Refused {
+  const char *lines, *reason;
+};
+
+TEST(Bodies, BadOnesAreRefused) {
+  const std::vector<Refused> all = {
+      {"bodies: [{name: a, material: cheese, tube: {x_mm: [0, 1], y_mm: [0, 0], z_mm: [0, 0], radius_mm: [1]}}]\n",
+       "artery, bile_duct"},
+      {"bodies: [{name: a, material: liver}]\n", "needs one of"},
+      {"bodies: [{name: a, material: liver, mesh: nowhere.stl}]\n", "nowhere.stl"},
+      {"bodies: [{name: organ, material: liver, shape: {ellipsoid_mm: [9, 9, 9]}}]\n", "is there twice"},
+      {"bodies: [{name: a, material: liver, tube: {x_mm: [0, 1], y_mm: [0, 0], z_mm: [0, 1, 2], radius_mm: [1]}}]\n",
+       "as many entries"},
+      {"bodies: [{name: a, material: liver, tube: {x_mm: [0, 0], y_mm: [0, 0], z_mm: [0, 0], radius_mm: [1]}}]\n",
+       "apart"},
+      {"attach: [{from: organ, to: moon}]\n", "'moon'"},
+      {"attach: [{from: organ, to: organ}]\n", "another body"},
+      {"bodies: [{name: a, material: liver, shape: {ellipsoid_mm: [15, 15, 15], at_mm: [0, 0, 150]}}]\n"
+       "attach: [{from: a, to: organ, reach_mm: 2}]\n",
+       "within 2 mm"},
+  };
+  for (const Refused& refused : all) {
+    EXPECT_NE(RefusalOf(refused.lines).find(refused.reason), std::string::npos)
+        << refused.lines << RefusalOf(refused.lines);
+  }
+}
+
+TEST(Bodies, FaultsOfAFileAreFound) {
+  const SceneData good = BuildScene(SmallWith(kBodies), {});
+  const std::vector<std::function<void(SceneData&)>> faults = {
+      [](SceneData& s) { s.solids[1].first_vertex += 1; },
+      [](SceneData& s) { s.solids[2].vertex_count -= 1; },
+      [](SceneData& s) { s.solids[0].surface_triangle_count += 1; },
+      [](SceneData& s) { s.solids[1].youngs_modulus_Pa = NAN; },
+      [](SceneData& s) { s.solids[1].look = static_cast<SolidLook>(99); },
+      [](SceneData& s) { std::fill(std::begin(s.solids[1].name), std::end(s.solids[1].name), 'x'); },
+      [](SceneData& s) { s.attachments[0].vertex = s.fixed.tube_vertex_count; },
+      [](SceneData& s) { s.attachments[0].surface[1] = 0; },
+      [](SceneData& s) { s.attachments[0].vertex = s.attachments[0].surface[0]; },
+      [](SceneData& s) { s.attachments[0].stiffness_N_per_m = INFINITY; },
+      [](SceneData& s) { s.fixed.physics.mode = PhysicsMode::kXpbd; },
+      [](SceneData& s) { std::swap(s.tets[0][0], s.tets[s.tets.size() - 1][0]); },
+      [](SceneData& s) { s.solids.pop_back(); },
+  };
+  for (std::size_t i = 0; i < faults.size(); ++i) {
+    SceneData bad = good;
+    faults[i](bad);
+    EXPECT_TRUE(FindFault(bad.View())) << i;
+  }
+}
+
+}  // namespace
+}  // namespace fulcrum::scene
