@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <set>
 
 #include "physics_node/implicit/coarse_row.h"
@@ -43,21 +42,24 @@ std::vector<Place> Spread(int fine, int count) {
   return place;
 }
 
-/// The coarse nodes in order along the longest side of the box around them: neighbours are close in it, so the factor
-/// is a band.
-std::vector<std::uint32_t> AlongLongestSide(const std::vector<Vec3d>& place) {
-  Eigen::AlignedBox3d box;
-  for (const Vec3d& p : place) {
-    box.extend(p);
-  }
-  Eigen::Index axis = 0;
-  if (!place.empty()) {
+/// The coarse nodes group by group, each along the longest side of the box around it: neighbours are close in it, so
+/// the factor is a band.
+std::vector<std::uint32_t> Order(const std::vector<Vec3d>& place, const std::vector<int>& group) {
+  std::vector<std::uint32_t> order;
+  for (int g = 0; order.size() < place.size(); ++g) {
+    const std::size_t first = order.size();
+    Eigen::AlignedBox3d box;
+    for (std::uint32_t i = 0; i < place.size(); ++i) {
+      if (group[i] != g) continue;
+      order.push_back(i);
+      box.extend(place[i]);
+    }
+    if (first == order.size()) continue;
+    Eigen::Index axis = 0;
     box.sizes().maxCoeff(&axis);
+    std::stable_sort(order.begin() + static_cast<std::ptrdiff_t>(first), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return place[a][axis] < place[b][axis]; });
   }
-  std::vector<std::uint32_t> order(place.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::uint32_t a, std::uint32_t b) { return place[a][axis] < place[b][axis]; });
   return order;
 }
 
@@ -246,11 +248,15 @@ void CoarseSpace::BuildLattice(const TissueScene& scene, const ElasticModel& mod
     }
   }
   place.resize(static_cast<std::size_t>(grid_.nodes));
+  // The organ with the membrane last: most other solids are joined to nothing else, and little fills in.
+  const int last = static_cast<int>(lattices.size()) - 1;
+  std::vector<int> group(place.size(), last);
   for (const auto& [key, node] : numbers) {
     const Lattice& lattice = lattices[key.first];
     place[node] = lattice.origin + lattice.spacing * Vec3d(key.second[0], key.second[1], key.second[2]);
+    if (key.first > 0) group[node] = static_cast<int>(key.first) - 1;
   }
-  matrix_.factor = CoarseFactor(AlongLongestSide(place));
+  matrix_.factor = CoarseFactor(Order(place, group));
   scratch_.nodes4 = FloatArray(kVertexFloats * static_cast<std::size_t>(grid_.nodes));
   scratch_.tube_nodes4 = FloatArray(kVertexFloats * static_cast<std::size_t>(grid_.nodes));
 }

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <functional>
 #include <map>
+#include <numbers>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -90,7 +91,10 @@ std::string Page(const AnatomyImport& import, const LabelMap& map, const std::ve
   page += has_voxels ? "<th>label<th>voxels<th>ml of voxels<th>ml of mesh<th>difference" : "<th>ml of mesh";
   page += "<th>pieces<th>triangles";
   for (const LabelReport& r : reports) {
-    page += "<tr><td>" + EscapeHtml(r.use.name) + (r.use.is_organ ? " (deformable)" : "");
+    page += "<tr><td>" + EscapeHtml(r.use.name) +
+            (r.use.is_organ            ? " (under the membrane)"
+             : !r.use.material.empty() ? " (deformable)"
+                                       : "");
     page += has_voxels ? PrintText("<td>%d<td>%zu<td>%.2f<td>%.2f<td>%+.1f %%", r.use.label, r.voxels,
                                    r.voxel_volume_ml, r.volume_ml, 100 * (r.volume_ml / r.voxel_volume_ml - 1))
                        : PrintText("<td>%.2f", r.volume_ml);
@@ -155,8 +159,46 @@ std::map<std::string, TriangleMesh> SurfacesOfFiles(const AnatomyImport& import,
   return surfaces;
 }
 
+Vec3d MiddleOf(const TriangleMesh& mesh) {
+  Vec3d sum = Vec3d::Zero();
+  for (const Vec3d& p : mesh.vertices) sum += p;
+  return sum / static_cast<double>(std::max<std::size_t>(mesh.vertices.size(), 1));
+}
+
+/// Some vertex of one is nearer to a triangle of the other.
+bool Touch(const TriangleMesh& one, const TriangleMesh& other, double reach) {
+  const TriangleLocator locator(other.vertices, other.triangles);
+  return std::ranges::any_of(one.vertices,
+                             [&](const Vec3d& p) { return locator.Closest(p, reach).triangle != kNoIndex; });
+}
+
 const LabelUse& OrganOf(const std::vector<LabelUse>& uses) {
   return *std::find_if(uses.begin(), uses.end(), [](const LabelUse& u) { return u.is_organ; });
+}
+
+/// Edges of the tetrahedra, held sides and attachments of the deformable neighbours.
+void Solidify(const std::vector<LabelUse>& uses, const std::map<std::string, TriangleMesh>& surfaces, NewScene* scene) {
+  constexpr double kVertices = 6000, kMostOfOne = 1200, kTetsPerVertex = 5;  // Of all, beside membrane and organ.
+  constexpr double kTouch_mm = 2,
+                   kReach_m = 0.004;  // The surface of the tetrahedra is up to a quarter of their edge off.
+  std::vector<NewNeighbour*> deformable;
+  for (NewNeighbour& n : scene->neighbours) {
+    if (!n.material.empty()) deformable.push_back(&n);
+  }
+  const TriangleMesh& organ = surfaces.at(OrganOf(uses).name);
+  const double tets = kTetsPerVertex * std::min(kMostOfOne, kVertices / static_cast<double>(deformable.size()));
+  for (std::size_t i = 0; i < deformable.size(); ++i) {
+    NewNeighbour& n = *deformable[i];
+    const TriangleMesh& mesh = surfaces.at(n.surface.name);
+    // A regular tetrahedron has edge^3 / (6 sqrt 2).
+    n.tet_edge_mm = std::clamp(std::cbrt(6 * std::numbers::sqrt2 * EnclosedVolume(mesh) / tets), 0.5, 50.0);
+    n.held_side = (MiddleOf(mesh) - MiddleOf(organ)).normalized();
+    if (Touch(mesh, organ, kTouch_mm)) scene->attach.push_back({n.surface.name, "organ", kReach_m});
+    for (std::size_t j = 0; j < i; ++j) {
+      const std::string& other = deformable[j]->surface.name;
+      if (Touch(mesh, surfaces.at(other), kTouch_mm)) scene->attach.push_back({n.surface.name, other, kReach_m});
+    }
+  }
 }
 
 }  // namespace
@@ -181,7 +223,9 @@ LabelUses ReadLabelUses(const fs::path& file) {
     }
     use.is_organ = entry.Flag("organ", false);
     organs += use.is_organ ? 1 : 0;
-    if (use.is_organ && organs > 1) entry.Fail("organ", "there is one already: a scene has one deformable organ");
+    if (use.is_organ && organs > 1)
+      entry.Fail("organ",
+                 "there is one already: a scene has one organ under the membrane; give the others a `material`");
     const std::string role = entry.TextOr("role", RoleName(use.role), 31);
     try {
       use.role = RoleNamed(role);
@@ -189,6 +233,13 @@ LabelUses ReadLabelUses(const fs::path& file) {
       entry.Fail("role", error.what());
     }
     use.collides = entry.Flag("collides", use.collides);
+    use.material = entry.TextOr("material", "", 31);
+    if (!use.material.empty() && FindMaterial(use.material) == nullptr) {
+      entry.Fail("material", "'" + use.material + "' is not one of " + MaterialNames());
+    }
+    if (use.is_organ && !use.material.empty()) {
+      entry.Fail("material", "is for the others: the scene's `physics` has the organ's modulus");
+    }
     use.triangles_max = static_cast<int>(entry.Integer("triangles_max", use.triangles_max, 100, 100000));
     if (!names.insert(use.name).second) entry.Fail("name", "is there twice");
     if (!sources.insert(use.file + "/" + std::to_string(use.label)).second) {
@@ -250,8 +301,10 @@ std::string SuggestLabelUses(const fs::path& labels) {
   const auto largest =
       std::max_element(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.size < b.size; });
   std::string text =
-      "# What becomes of each: one deformable organ, which gets the membrane; the others stay fixed. What is "
-      "left out is ignored.\n# role: abdominal_wall, retroperitoneum, pelvis, bladder or other, which "
+      "# What becomes of each: one organ, which gets the membrane; the others are deformable with a `material` (" +
+      MaterialNames() +
+      "), else fixed. What is left out is ignored.\n# role: abdominal_wall, retroperitoneum, pelvis, bladder or other, "
+      "which "
       "decides the colour.\n";
   if (is_folder)
     text +=
@@ -311,11 +364,13 @@ std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const P
     say(PrintText("%s: %.1f ml, %d pieces, %zu triangles", file.c_str(), report.volume_ml, report.pieces,
                   report.triangles));
     if (!use.is_organ) {
-      scene.surroundings.push_back(
-          {use.name, use.role, import.out / file, Vec3f::Zero(), use.triangles_max, use.collides});
+      NewNeighbour& neighbour = scene.neighbours.emplace_back();
+      neighbour.surface = {use.name, use.role, import.out / file, Vec3f::Zero(), use.triangles_max, use.collides};
+      neighbour.material = use.material;
     }
     reports.push_back(report);
   }
+  Solidify(uses, surfaces, &scene);
   scene.mesh_text = OrganOf(uses).name + ".ply";
   scene.mesh = import.out / scene.mesh_text;
   const fs::path yaml = import.out / (import.name + ".yaml");

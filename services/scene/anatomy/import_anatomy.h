@@ -16,7 +16,8 @@ struct LabelUse {
   int label = 0;  ///< 0: `file` instead.
   std::string file;
   std::string name;
-  bool is_organ = false;  ///< Deformable, under the membrane: one of all. The others are fixed surroundings.
+  bool is_organ = false;  ///< Deformable, under the membrane: one of all.
+  std::string material;   ///< Of another deformable body; empty: fixed.
   SurfaceRole role = SurfaceRole::kOther;
   bool collides = true;
   int triangles_max = 10000;

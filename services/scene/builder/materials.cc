@@ -46,6 +46,12 @@ constexpr std::array<NamedMaterial, 8> kMaterials{{
 
 std::span<const NamedMaterial> Materials() { return kMaterials; }
 
+std::string MaterialNames() {
+  std::string names;
+  for (const NamedMaterial& m : kMaterials) names += (names.empty() ? "" : ", ") + std::string(m.name);
+  return names;
+}
+
 const NamedMaterial* FindMaterial(std::string_view name) {
   const auto at = std::ranges::find(kMaterials, name, &NamedMaterial::name);
   return at == kMaterials.end() ? nullptr : &*at;

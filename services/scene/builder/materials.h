@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "services/base/core/scene_view.h"
@@ -23,6 +24,9 @@ struct NamedMaterial {
 
 /// Sorted by name.
 std::span<const NamedMaterial> Materials();
+
+/// For messages.
+std::string MaterialNames();
 
 /// nullptr: none of this name.
 const NamedMaterial* FindMaterial(std::string_view name);

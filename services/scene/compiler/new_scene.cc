@@ -199,13 +199,34 @@ std::string OrganText(const NewScene& scene, const ImportSettings& import, bool 
     text += "    # patch: {at_mm: [x, y, z], width_mm: 60, length_mm: 80}   to move it, in the frame of the file\n";
   }
   text += PrintText("    cavity_mm: %.0f\n", 1e3 * import.cavity_m);
-  if (!scene.surroundings.empty()) text += "    surroundings:\n";
-  for (const ImportSettings::Surrounding& s : scene.surroundings) {
+  const bool any_fixed = std::ranges::any_of(scene.neighbours, [](const auto& n) { return n.material.empty(); });
+  if (any_fixed) text += "    surroundings:\n";
+  for (const NewNeighbour& neighbour : scene.neighbours) {
+    if (!neighbour.material.empty()) continue;
+    const ImportSettings::Surrounding& s = neighbour.surface;
     text += "      - {name: " + s.name + ", role: " + std::string(RoleName(s.role)) +
             ", file: " + s.file.filename().string() +
             PrintText(", triangles_max: %d%s}\n", s.triangles_max, s.collides ? ", collides: true" : "");
   }
   return text;
+}
+
+std::string BodiesText(const NewScene& scene) {
+  std::string text;
+  for (const NewNeighbour& n : scene.neighbours) {
+    if (n.material.empty()) continue;
+    text +=
+        text.empty() ? "bodies:                          # each held on the side that faces away from the organ\n" : "";
+    text +=
+        "  - {name: " + n.surface.name + ", material: " + n.material + ", mesh: " + n.surface.file.filename().string() +
+        PrintText(", tet_edge_mm: %.1f, triangles_max: %d,\n     held_side: ", n.tet_edge_mm, n.surface.triangles_max) +
+        TextOf(n.held_side) + "}\n";
+  }
+  if (!scene.attach.empty()) text += "\nattach:                          # tissue between what touches\n";
+  for (const AttachSettings& a : scene.attach) {
+    text += "  - {from: " + a.from + ", to: " + a.to + PrintText(", reach_mm: %.1f}\n", 1e3 * a.reach_m);
+  }
+  return text.empty() ? text : text + "\n";
 }
 
 std::string ScriptText(const SheetSize& size, const Vec3d& hook_wait_mm) {
@@ -280,7 +301,7 @@ std::string DescribeNewScene(const NewScene& given, const Progress& progress) {
   settings.membrane.rows = 101;
   settings.membrane.cols = 64;
   settings.membrane.gap_m = 0.003;
-  import.surroundings = scene.surroundings;
+  for (const NewNeighbour& n : scene.neighbours) import.surroundings.push_back(n.surface);
   const auto take = [&] {
     try {
       return ImportAnatomy(settings, progress);
@@ -291,7 +312,7 @@ std::string DescribeNewScene(const NewScene& given, const Progress& progress) {
     }
   };
   Anatomy anatomy = take();
-  if (!scene.facing && !scene.surroundings.empty()) ChooseSide(&scene, &import, take, &anatomy);
+  if (!scene.facing && !scene.neighbours.empty()) ChooseSide(&scene, &import, take, &anatomy);
   const std::vector<Vec3d> obstacles = ObstaclesOf(anatomy);
   const SheetSize size = SizeOf(settings.membrane, anatomy.sheet);
   ChooseMembrane(size, &settings.membrane);
@@ -309,7 +330,7 @@ std::string DescribeNewScene(const NewScene& given, const Progress& progress) {
                      "Every key: services/scene/README.md.\n" +
                      "name: \"" + scene.name + "\"\n" +
                      "description: " + Quoted("Organ from " + scene.mesh.filename().string()) + "\n\n";
-  text += OrganText(scene, import, anatomy.is_patch) + "\n";
+  text += OrganText(scene, import, anatomy.is_patch) + "\n" + BodiesText(scene);
   text += PrintText(
       "membrane:\n  rows: %d\n  cols: %d\n  gap_mm: %.1f                  # fat between membrane and organ\n"
       "  binding_reach_mm: %.1f\n\n",

@@ -12,6 +12,14 @@
 
 namespace fulcrum::scene {
 
+/// Something beside the organ.
+struct NewNeighbour {
+  ImportSettings::Surrounding surface;
+  std::string material;  ///< Of a deformable body; empty: it is fixed.
+  double tet_edge_mm = 6;
+  Vec3d held_side = Vec3d::UnitZ();  ///< In the frame of the file.
+};
+
 struct NewScene {
   std::string name;
   std::filesystem::path mesh;
@@ -21,7 +29,8 @@ struct NewScene {
   std::optional<Vec3d> facing;  ///< From the organ to the membrane, in the frame of the file.
   /// In files beside that of the organ, in the same frame. Scope and tools are placed clear of them and, without
   /// `facing`, the membrane on a side that can be seen.
-  std::vector<ImportSettings::Surrounding> surroundings;
+  std::vector<NewNeighbour> neighbours;
+  std::vector<AttachSettings> attach;
 };
 
 /// The text of the description. Imports the mesh on the way, which decides what it says. Throws InputError.

@@ -11,7 +11,7 @@ namespace {
 using config::Range;
 using config::StrictMap;
 
-constexpr std::size_t kMostPoints = 64;
+constexpr std::size_t kMostShapePoints = 64;
 constexpr std::size_t kMostAttachments = 64;
 
 enum class Ends { kNone, kFirst, kLast, kBoth };
@@ -22,7 +22,7 @@ void ReadSwept(StrictMap* map, ShapeSettings* shape) {
   std::array<std::vector<double>, 3> axes;
   const std::array keys = {"x_mm", "y_mm", "z_mm"};
   for (std::size_t k = 0; k < 3; ++k) {
-    axes[k] = map->NumbersSi(keys[k], 2, kMostPoints, Range::Between(-5000, 5000));
+    axes[k] = map->NumbersSi(keys[k], 2, kMostShapePoints, Range::Between(-5000, 5000));
     if (axes[k].size() != axes[0].size()) map->Fail(keys[k], "must have as many entries as x_mm");
   }
   for (std::size_t i = 0; i < axes[0].size(); ++i) {
@@ -31,7 +31,7 @@ void ReadSwept(StrictMap* map, ShapeSettings* shape) {
       map->Fail("x_mm", "two points that follow each other are less than 0.1 mm apart");
     }
   }
-  shape->radius_m = map->NumbersSi("radius_mm", 1, kMostPoints, Range::Between(0.3, 200));
+  shape->radius_m = map->NumbersSi("radius_mm", 1, kMostShapePoints, Range::Between(0.3, 200));
   if (shape->radius_m.size() == 1) shape->radius_m.resize(axes[0].size(), shape->radius_m[0]);
   if (shape->radius_m.size() != axes[0].size()) map->Fail("radius_mm", "must have one entry, or as many as x_mm");
 }
@@ -40,9 +40,7 @@ Material ReadMaterial(StrictMap* map) {
   const std::string name = map->Text("material", 31);
   const NamedMaterial* named = FindMaterial(name);
   if (named == nullptr) {
-    std::string valid;
-    for (const NamedMaterial& m : Materials()) valid += (valid.empty() ? "" : ", ") + std::string(m.name);
-    map->Fail("material", "'" + name + "' is not one of " + valid);
+    map->Fail("material", "'" + name + "' is not one of " + MaterialNames());
   }
   Material material = named->material;
   material.look = map->Choice("look", material.look, kSolidLookNames);

@@ -235,6 +235,11 @@ TEST_F(Segmentation, UsesOfLabelsAreChecked) {
   EXPECT_NE(refusal("labels:\n  - {label: 1, name: a, organ: true}\n  - {label: 2, name: b, organ: true}\n")
                 .find("there is one already"),
             std::string::npos);
+  EXPECT_NE(refusal("labels:\n  - {label: 1, name: a, organ: true}\n  - {label: 2, name: b, material: cheese}\n")
+                .find("artery, bile_duct"),
+            std::string::npos);
+  EXPECT_NE(refusal("labels:\n  - {label: 1, name: a, organ: true, material: liver}\n").find("is for the others"),
+            std::string::npos);
   EXPECT_NE(refusal("labels:\n  - {label: 1, name: ../a, organ: true}\n").find("it names a file"), std::string::npos);
   EXPECT_NE(refusal("labels:\n  - {label: 1, name: a, organ: true}\n  - {label: 1, name: b}\n").find("is there twice"),
             std::string::npos);
@@ -280,6 +285,47 @@ TEST_F(Segmentation, ASegmentationBecomesAScene) {
   };
   EXPECT_NE(again("patient").find("is there already and not empty"), std::string::npos) << "edited files stay";
   EXPECT_NE(again("other").find("label 4 (rectum) has 0 voxels"), std::string::npos);
+}
+
+TEST_F(Segmentation, LabelsWithAMaterialDeform) {
+  Eigen::Affine3d ras = Around(Vec3d(-1.5, -1.5, 2).asDiagonal(), {64, 64, 64});
+  // Two balls that touch the tube and one that does not.
+  const LabelMap map = Fill({64, 64, 64}, Eigen::Affine3d(fulcrum::testing::WFromRas() * ras), [](const Vec3d& p) {
+    if (std::hypot(p.x(), p.z()) < 15 && std::abs(p.y()) < 50) return 3;
+    if ((p - Vec3d(28, 10, 0)).norm() < 14) return 4;
+    if ((p - Vec3d(-28, -20, 0)).norm() < 14) return 5;
+    return (p - Vec3d(28, -35, 0)).norm() < 9 ? 6 : 0;
+  });
+  const fs::path file =
+      Write("labels.nii.gz", fulcrum::testing::NiftiBytes(map, fulcrum::testing::NiftiHeader(map, ras, false)));
+  std::ofstream(folder_ / "labels.yaml")
+      << "labels:\n  - {label: 3, name: rectum, organ: true}\n  - {label: 4, name: ovary, material: liver}\n"
+         "  - {label: 5, name: lump, material: fat}\n  - {label: 6, name: bone}\n";
+  (void)ImportAnatomyFiles({"patient", file, folder_ / "labels.yaml", folder_ / "patient"}, {});
+  const SceneData data = CompileScene(folder_ / "patient" / "patient.yaml", {}, {}).data;
+  const auto fault = FindFault(data.View());
+  EXPECT_FALSE(fault) << fault->section << ": " << fault->reason;
+  ASSERT_EQ(data.solids.size(), 3u);
+  EXPECT_STREQ(data.solids[1].name, "ovary");
+  EXPECT_EQ(data.solids[2].look, SolidLook::kFat);
+  EXPECT_EQ(std::string(data.static_surfaces.back().name), "bone");
+  std::array<int, 3> joined{}, held{}, count{};
+  for (const Attachment& a : data.attachments) {
+    for (std::size_t k = 1; k < 3; ++k) {
+      const Solid& s = data.solids[k];
+      joined[k] += a.vertex >= s.first_vertex && a.vertex < s.first_vertex + s.vertex_count ? 1 : 0;
+    }
+  }
+  for (std::size_t k = 1; k < 3; ++k) {
+    const Solid& s = data.solids[k];
+    count[k] = static_cast<int>(s.vertex_count);
+    for (Index v = s.first_vertex; v < s.first_vertex + s.vertex_count; ++v)
+      held[k] += data.inverse_mass[v] == 0 ? 1 : 0;
+    EXPECT_GT(joined[k], 2) << k;
+    EXPECT_GT(count[k], 300);
+    EXPECT_GT(held[k], count[k] / 8);
+    EXPECT_LT(held[k], count[k] / 2);
+  }
 }
 
 TEST_F(Segmentation, AFolderOfSurfacesBecomesAScene) {

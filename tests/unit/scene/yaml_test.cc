@@ -49,8 +49,8 @@ TEST(ShippedScenes, AreListedWithNameAndDescription) {
     names.insert(scene.name);
   }
   EXPECT_EQ(names, (std::set<std::string>{"assisted", "built-in", "camera", "coagulate", "cut_line", "dissection",
-                                          "hold", "keep_clear", "line", "openhelp", "pedal", "regrasp", "seal_and_cut",
-                                          "small", "strokes", "traction", "two_hands"}));
+                                          "gallbladder", "hold", "keep_clear", "line", "openhelp", "pedal", "regrasp",
+                                          "seal_and_cut", "small", "strokes", "traction", "two_hands"}));
 }
 
 TEST(ShippedScenes, SayTheSameAsThePresets) {
