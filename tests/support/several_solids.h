@@ -55,24 +55,33 @@ void Fix(scene::SolidBody* body, const Held& held) {
   for (std::size_t i = 0; i < body->vertices.size(); ++i) body->fixed[i] = body->fixed[i] || held(body->vertices[i]);
 }
 
-/// Solids: 0 the organ, 1 `pad`, 2 `lump`, 3 `strand`, 4 `other strand`.
-inline scene::SceneData SeveralSolids(const Vec3f& gravity = Vec3f::Zero()) {
-  scene::SceneSettings settings = scene::Small();
+/// Adds solids beside the organ, 1 `pad`, 2 `lump`, 3 `strand`, 4 `other strand`, the pad's lower corner at `corner`.
+/// The lump is loose unless it is `joined` to the pad.
+inline scene::SceneData WithSolids(scene::SceneSettings settings, const Vec3d& corner, bool joined,
+                                   double strand_Pa = 2e5) {
   settings.physics.mode = PhysicsMode::kAccurate;
-  settings.physics.gravity = gravity;
   settings.attach = {{"strand", "pad", 0.002, 5e4}};
+  if (joined) settings.attach.push_back({"lump", "pad", 0.002, 2e4});
   scene::Anatomy anatomy = scene::ProceduralAnatomy(settings);
-  scene::SolidBody pad = Box("pad", {0.12, -0.02, 0}, {0.04, 0.04, 0.015}, {8, 8, 3}, 2e4);
-  Fix(&pad, [](const Vec3d& p) { return p.z() < 1e-6; });
-  scene::SolidBody strand = Box("strand", {0.161, -0.002, 0.004}, {0.06, 0.004, 0.004}, {15, 1, 1}, 2e5);
-  Fix(&strand, [](const Vec3d& p) { return p.x() > 0.2209; });
-  scene::SolidBody other = Box("other strand", {0.12, 0.03, 0.004}, {0.06, 0.004, 0.004}, {15, 1, 1}, 2e5);
-  Fix(&other, [](const Vec3d& p) { return p.x() > 0.1799 || p.x() < 0.1201; });
+  const auto at = [&](double x, double y, double z) { return Vec3d(corner + Vec3d(x, y, z)); };
+  scene::SolidBody pad = Box("pad", corner, {0.04, 0.04, 0.015}, {8, 8, 3}, 2e4);
+  Fix(&pad, [&](const Vec3d& p) { return p.z() < corner.z() + 1e-6; });
+  scene::SolidBody strand = Box("strand", at(0.041, 0.018, 0.004), {0.06, 0.004, 0.004}, {15, 1, 1}, strand_Pa);
+  Fix(&strand, [&](const Vec3d& p) { return p.x() > corner.x() + 0.1009; });
+  scene::SolidBody other = Box("other strand", at(0, 0.05, 0.004), {0.06, 0.004, 0.004}, {15, 1, 1}, strand_Pa);
+  Fix(&other, [&](const Vec3d& p) { return p.x() > corner.x() + 0.0599 || p.x() < corner.x() + 1e-4; });
   anatomy.solids.push_back(std::move(pad));
-  anatomy.solids.push_back(Box("lump", {0.13, -0.01, 0.016}, {0.02, 0.02, 0.02}, {4, 4, 4}, 4e4));
+  anatomy.solids.push_back(Box("lump", at(0.01, 0.01, 0.016), {0.02, 0.02, 0.02}, {4, 4, 4}, 4e4));
   anatomy.solids.push_back(std::move(strand));
   anatomy.solids.push_back(std::move(other));
   return scene::AssembleScene(settings, anatomy);
+}
+
+/// The small scene with solids 120 mm beside the organ.
+inline scene::SceneData SeveralSolids(const Vec3f& gravity = Vec3f::Zero(), bool joined = false) {
+  scene::SceneSettings settings = scene::Small();
+  settings.physics.gravity = gravity;
+  return WithSolids(std::move(settings), {0.12, -0.02, 0}, joined);
 }
 
 }  // namespace fulcrum

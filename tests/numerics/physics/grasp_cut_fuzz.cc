@@ -6,6 +6,7 @@
 #include "physics_node/simulation/script_player.h"
 #include "services/scene/builder/build.h"
 #include "tests/numerics/physics/tissue_validator.h"
+#include "tests/support/several_solids.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -16,12 +17,14 @@ constexpr int kCutsPerSheet = 60;
 constexpr int kRestSteps = 1500;
 /// Bounds while tools act: the largest pull of a grasper and the speed limit of the solver.
 constexpr TissueBounds kActing{0.120f, 5.0f, 20.0f, false};
+/// Of the strands: a pull of 8 N stretches them by half.
+constexpr double kStrand_Pa = 2e6;
 /// Bounds at rest: a cut sheet under tension retracts from the cut, and its flaps stay where they have fallen. Some
 /// flaps keep moving: there the preconditioned matrix exceeds what two iterations can handle.
 constexpr TissueBounds kResting{0.030f, 0.3f, 0.0f, true};
 
 /// Forty millimetres of the small scene, in which a step takes some tens of microseconds.
-scene::SceneData TinyScene(bool two_graspers) {
+scene::SceneData TinyScene(bool two_graspers, bool several_solids) {
   scene::SceneSettings settings = scene::Small();
   settings.tube.rings = 6;
   settings.tube.segments = 8;
@@ -32,7 +35,8 @@ scene::SceneData TinyScene(bool two_graspers) {
   if (two_graspers) {
     settings.tools[1] = scene::DefaultTool(ToolKind::kGrasper, settings.tools[1].p_WP);
   }
-  return scene::BuildProcedural(settings);
+  return several_solids ? WithSolids(settings, {0.036, -0.02, 0.02}, true, kStrand_Pa)
+                        : scene::BuildProcedural(settings);
 }
 
 TopologyState Whole(const SceneView& scene) {
@@ -48,9 +52,10 @@ TopologyState Whole(const SceneView& scene) {
 
 }  // namespace
 
-GraspCutFuzz::GraspCutFuzz(unsigned seed)
+GraspCutFuzz::GraspCutFuzz(unsigned seed, bool several_solids)
     : random_(seed),
-      data_(TinyScene(seed % 2 == 1)),
+      several_solids_(several_solids),
+      data_(TinyScene(seed % 2 == 1, several_solids)),
       scene_(data_.View()),
       simulation_(std::make_unique<TissueSimulation>(scene_)),
       topology_(Whole(scene_)) {}
@@ -63,10 +68,10 @@ void GraspCutFuzz::Step() {
   counts_.fastest_m_s = std::max(counts_.fastest_m_s, report_.max_step_m / simulation_->step_s());
 }
 
-/// Near the present position of a random node, sometimes of a vertex of the organ; somewhat above or in it.
+/// Near the present position of a random node, sometimes of a vertex of a solid; somewhat above or in it.
 Vec3f GraspCutFuzz::PlaceOnTissue() {
   const Index first = scene_.membrane.first;
-  const Index p = Unit() < 0.8f ? first + Below(scene_.membrane.node_count()) : Below(first);
+  const Index p = Unit() < (several_solids_ ? 0.5f : 0.8f) ? first + Below(scene_.membrane.node_count()) : Below(first);
   const Vec3f off(0.004f * (Unit() - 0.5f), 0.004f * (Unit() - 0.5f), 0.010f * (Unit() - 0.6f));
   return simulation_->particles().At(simulation_->particles().Ref(p)) + off;
 }

@@ -22,7 +22,7 @@ struct FuzzCounts {
 class GraspCutFuzz {
  public:
   /// An even seed has a grasper and a hook, an odd seed two graspers.
-  explicit GraspCutFuzz(unsigned seed);
+  explicit GraspCutFuzz(unsigned seed, bool several_solids = false);
 
   /// Runs the next operation and its steps; returns a violated invariant, or nothing.
   [[nodiscard]] std::string Operate();
@@ -51,6 +51,7 @@ class GraspCutFuzz {
 
   std::mt19937 random_;
   std::uniform_real_distribution<float> unit_{0.0f, 1.0f};
+  bool several_solids_;
   scene::SceneData data_;
   SceneView scene_;
   std::unique_ptr<TissueSimulation> simulation_;

@@ -1,4 +1,5 @@
-// Ten thousand random grasps, cuts and releases, half with a grasper and a hook, half with two graspers.
+// Ten thousand random grasps, cuts and releases on one organ, five thousand on several solids; half with a grasper and
+// a hook, half with two graspers.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -10,14 +11,15 @@ namespace {
 
 constexpr int kOperations = 5000, kRestEvery = 100;
 
-class GraspCutSoak : public testing::TestWithParam<unsigned> {};
+/// Seed, and whether there are several solids.
+class GraspCutSoak : public testing::TestWithParam<std::pair<unsigned, bool>> {};
 
 TEST_P(GraspCutSoak, FiveThousandOperations) {
-  GraspCutFuzz fuzz(GetParam());
+  GraspCutFuzz fuzz(GetParam().first, GetParam().second);
   for (int i = 1; i <= kOperations; ++i) {
-    ASSERT_EQ(fuzz.Operate(), "") << "seed " << GetParam() << " operation " << i;
+    ASSERT_EQ(fuzz.Operate(), "") << "seed " << GetParam().first << " operation " << i;
     if (i % kRestEvery == 0) {
-      ASSERT_EQ(fuzz.Rest(), "") << "seed " << GetParam() << " operation " << i;
+      ASSERT_EQ(fuzz.Rest(), "") << "seed " << GetParam().first << " operation " << i;
     }
   }
   const FuzzCounts& c = fuzz.counts();
@@ -33,7 +35,9 @@ TEST_P(GraspCutSoak, FiveThousandOperations) {
       c.fastest_at_rest_m_s, c.restless, c.rests);
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, GraspCutSoak, testing::Values(11u, 12u));
+INSTANTIATE_TEST_SUITE_P(Seeds, GraspCutSoak,
+                         testing::Values(std::pair{11u, false}, std::pair{12u, false}, std::pair{13u, true},
+                                         std::pair{14u, true}));
 
 }  // namespace
 }  // namespace fulcrum::physics

@@ -23,6 +23,17 @@ TEST_P(GraspCut, NothingBreaks) {
   EXPECT_GT(fuzz.counts().cuts, 15);
 }
 
+TEST(GraspCutOfSeveralSolids, NothingBreaks) {
+  GraspCutFuzz fuzz(4, true);
+  for (int i = 1; i <= 2 * kOperations; ++i) {
+    ASSERT_EQ(fuzz.Operate(), "") << "operation " << i;
+    if (i % kRestEvery == 0) {
+      ASSERT_EQ(fuzz.Rest(), "") << "operation " << i;
+    }
+  }
+  EXPECT_GT(fuzz.counts().holds, 20);
+}
+
 INSTANTIATE_TEST_SUITE_P(Seeds, GraspCut, testing::Values(1u, 2u));
 
 TEST(GraspCut, TheSameSeedDoesTheSame) {

@@ -11,6 +11,7 @@
 #include "tests/numerics/physics/paper_solver.h"
 #include "tests/numerics/physics/reference/elastic_energy.h"
 #include "tests/numerics/physics/xpbd_under_test.h"
+#include "tests/support/several_solids.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -26,9 +27,9 @@ constexpr double kFoldedPart = 0.10, kReturnedPart = 0.02;
 /// the work, because the work is a sum over frames.
 constexpr double kEnergyMargin = 1.02, kWorkMargin = 1.05, kEnergyRounding_J = 1e-7;
 
-/// The small scene with the moduli of the standard case.
-scene::SceneData MakeScene() {
-  scene::SceneData data = scene::BuildProcedural(scene::Small());
+/// The small scene, if `several` with further solids, with the moduli of the standard case.
+scene::SceneData MakeScene(bool several = false) {
+  scene::SceneData data = several ? SeveralSolids(Vec3f::Zero(), true) : scene::BuildProcedural(scene::Small());
   PhysicsParams& physics = data.fixed.physics;
   physics.damping_per_s = 20;
   physics.membrane_Et_N_per_m = 300;
@@ -112,7 +113,7 @@ class Trial {
   }
   [[nodiscard]] int Inverted() const { return reference::InvertedTets(energy_.model(), x_); }
   [[nodiscard]] double OrganLength() const {
-    const auto organ = rest_.leftCols(scene_.tube_vertex_count);
+    const auto organ = rest_.leftCols(scene_.solids.empty() ? scene_.tube_vertex_count : scene_.solids[0].vertex_count);
     return (organ.rowwise().maxCoeff() - organ.rowwise().minCoeff()).maxCoeff();
   }
 
@@ -301,25 +302,31 @@ constexpr Abuse kMatrix[] = {
 struct Mode {
   const char* name;
   SolverFactory make;
-  bool strict;  ///< It must also return to rest.
+  bool strict;           ///< It must also return to rest.
+  bool several = false;  ///< With further solids.
 };
 const Mode kModes[] = {
     {"paper", [](const SceneView& s) { return std::make_unique<PaperSolver>(s); }, false},
     {"xpbd", [](const SceneView& s) { return std::make_unique<XpbdUnderTest>(s); }, false},
     {"accurate", [](const SceneView& s) { return std::make_unique<AccurateUnderTest>(s); }, true},
+    {"several", [](const SceneView& s) { return std::make_unique<AccurateUnderTest>(s); }, true, true},
 };
+
+const Mode& kAccurate = kModes[2];
 
 class Robustness : public testing::TestWithParam<std::tuple<int, int>> {};
 
 TEST_P(Robustness, StaysFiniteAndComesBack) {
   const Mode& mode = kModes[std::get<0>(GetParam())];
   const Abuse& abuse = kMatrix[std::get<1>(GetParam())];
-  scene::SceneData data = MakeScene();
+  scene::SceneData data = MakeScene(mode.several);
   abuse.scene(&data);
   const SceneView scene = data.View();
   Trial trial(scene, mode.make);
   const double given = abuse.act(&trial), work = trial.Work();
-  const double gained = trial.Return(given, mode.strict ? kReturnTime_s : kLookTime_s);
+  const double gained = trial.Return(given, mode.several  ? 2 * kReturnTime_s
+                                            : mode.strict ? kReturnTime_s
+                                                          : kLookTime_s);
   ASSERT_TRUE(trial.finite());
   RecordProperty("left_mm", std::to_string(1e3 * trial.DistanceFromRest()));
   if (mode.strict) {
@@ -336,7 +343,7 @@ TEST_P(Robustness, StaysFiniteAndComesBack) {
 TEST(ComesToRest, AfterAPull) {
   const scene::SceneData data = MakeScene();
   const SceneView scene = data.View();
-  Trial trial(scene, kModes[std::size(kModes) - 1].make);
+  Trial trial(scene, kAccurate.make);
   const double given = PullLittle(&trial);
   (void)trial.Return(given, 10);
   EXPECT_LT(trial.Energy(), 1e-6 * given);
@@ -348,7 +355,7 @@ TEST(Folds, OpenWhicheverWayTheOrganIsMirrored) {
   const scene::SceneData data = MakeScene();
   const SceneView scene = data.View();
   for (const Vec3d& signs : {Vec3d(1, -1, 1), Vec3d(1, 1, -1), Vec3d(-1, -1, -1)}) {
-    Trial trial(scene, kModes[std::size(kModes) - 1].make);
+    Trial trial(scene, kAccurate.make);
     const double given = MirrorBy(&trial, signs);
     EXPECT_LT(trial.Return(given, 5), kEnergyMargin);
     EXPECT_EQ(trial.Inverted(), 0) << signs.transpose();
