@@ -181,9 +181,11 @@ struct CoarseSpace::Lattice {
 /// Small solids get a lattice as fine as their number of vertices permits: bending of something thin is not in the span
 /// of a coarse one, and converges over seconds. Large ones get a coarser one: the factor's cost grows faster than
 /// theirs.
-CoarseSpace::Lattice CoarseSpace::LatticeOf(const Solid& solid, const ElasticModel& model) {
+CoarseSpace::Lattice CoarseSpace::LatticeOf(const Solid& solid, std::size_t solids, const ElasticModel& model) {
   constexpr double kFiner = 0.75, kFinest_m = 0.002;
-  constexpr std::size_t kMostNodes = 96, kVerticesPerNode = 8;
+  constexpr std::size_t kMostNodes = 96, kVerticesPerNode = 8, kLeastNodes = 27;
+  // Of all solids but the organ: matrix and factor grow with the square of the number.
+  constexpr std::size_t kNodesOfAll = 480;
   const std::span<const Vec3d> points = std::span(model.rest_position).subspan(solid.first_vertex, solid.vertex_count);
   Lattice lattice;
   if (points.empty()) return lattice;
@@ -201,11 +203,12 @@ CoarseSpace::Lattice CoarseSpace::LatticeOf(const Solid& solid, const ElasticMod
     }
     return keys.size();
   };
-  const std::size_t most = std::max(kMostNodes, points.size() / kVerticesPerNode);
+  const std::size_t share = solid.first_vertex == 0 ? points.size() : std::max(kLeastNodes, kNodesOfAll / (solids - 1));
+  const std::size_t most = std::min(std::max(kMostNodes, points.size() / kVerticesPerNode), share);
   while (nodes(lattice) > most) lattice.spacing /= kFiner;
   for (Lattice finer = lattice; finer.spacing > kFinest_m; lattice = finer) {
     finer.spacing *= kFiner;
-    if (nodes(finer) > std::min(kMostNodes, points.size())) break;
+    if (nodes(finer) > std::min({kMostNodes, points.size(), share})) break;
   }
   return lattice;
 }
@@ -215,7 +218,7 @@ void CoarseSpace::BuildLattice(const TissueScene& scene, const ElasticModel& mod
   grid_.nodes = grid_.columns * grid_.rows;
   const std::vector<Index> solid = SolidOfVertices(scene);
   std::vector<Lattice> lattices;
-  for (const Solid& s : scene.solids) lattices.push_back(LatticeOf(s, model));
+  for (const Solid& s : scene.solids) lattices.push_back(LatticeOf(s, scene.solids.size(), model));
   if (scene.solids.size() < 2) lattices.assign(1, Lattice{});
   std::map<std::pair<Index, std::array<int, 3>>, std::uint16_t> numbers;
   for (Index v = 0; v < scene.tube_vertex_count; ++v) {

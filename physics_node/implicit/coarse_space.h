@@ -133,7 +133,7 @@ class CoarseSpace {
 
   void BuildHats();
   struct Lattice;
-  static Lattice LatticeOf(const Solid& solid, const ElasticModel& model);
+  static Lattice LatticeOf(const Solid& solid, std::size_t solids, const ElasticModel& model);
   void BuildLattice(const TissueScene& scene, const ElasticModel& model);
   void AddTubeMass(const ElasticModel& model);
   void AddTube(const ElasticModel& model);
