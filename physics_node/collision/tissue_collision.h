@@ -1,5 +1,5 @@
-// Contact of tissue with tissue and with its surroundings: membrane nodes stay outside the organ, membrane and organ
-// stay in front of the fixed surfaces of the scene that collide.
+// Contact of tissue with tissue and with its surroundings: membrane nodes stay outside every solid, the surface of a
+// solid outside the others, and all stay in front of the fixed surfaces of the scene that collide.
 //
 // Distances are amortised: a particle at distance d from contact is evaluated again only when it and the surface may
 // together have moved by d. The solver reports movements by blocks of particles, so tissue at rest costs one comparison

@@ -12,8 +12,8 @@ namespace {
 
 /// Range of the search for the organ from the membrane at rest: contains every scene [m].
 constexpr float kRestRange = 1.0f;
-/// Of several solids, those are watched whose box is nearer than this at rest: tissue moves less than that towards them
-/// [m].
+/// Of several solids, those are watched whose box is nearer than this at rest: what something holds moves less than
+/// that towards them [m]. A solid without a fixed vertex can come from anywhere.
 constexpr float kSolidRange = 0.06f;
 
 /// Surface triangles of one solid in the rest shape.
@@ -21,6 +21,7 @@ struct SolidSurface {
   TriangleTree tree;
   std::vector<Index> triangles;  ///< Of tube_surface, by triangle of the tree.
   Eigen::AlignedBox3f box;
+  bool held = false;
 };
 
 std::vector<SolidSurface> SurfacesOf(const TissueScene& scene, const std::vector<Index>& solid) {
@@ -30,7 +31,10 @@ std::vector<SolidSurface> SurfacesOf(const TissueScene& scene, const std::vector
     const Triangle& v = scene.tube_surface[t];
     SolidSurface& surface = surfaces[solid[v[0]]];
     surface.triangles.push_back(t);
-    for (const Index vertex : v) surface.box.extend(scene.rest_position[vertex]);
+    for (const Index vertex : v) {
+      surface.box.extend(scene.rest_position[vertex]);
+      surface.held = surface.held || scene.inverse_mass[vertex] == 0.0f;
+    }
     corners[solid[v[0]]].push_back({scene.rest_position[v[0]], scene.rest_position[v[1]], scene.rest_position[v[2]]});
   }
   for (std::size_t i = 0; i < surfaces.size(); ++i) surfaces[i].tree = TriangleTree(std::move(corners[i]));
@@ -79,7 +83,8 @@ void TissueCollision::WatchOrgan() {
     const Vec3f& p = scene_.rest_position[particle];
     for (Index i = 0; i < surfaces.size(); ++i) {
       const SolidSurface& surface = surfaces[i];
-      const bool is_near = surfaces.size() == 1 || surface.box.exteriorDistance(p) < kSolidRange;
+      const bool is_loose = !surface.held || (own != kNoIndex && !surfaces[own].held);
+      const bool is_near = surfaces.size() == 1 || is_loose || surface.box.exteriorDistance(p) < kSolidRange;
       if (i == own || surface.tree.empty() || !is_near) continue;
       const TriangleTree::Hit hit = surface.tree.Nearest(p, kRestRange, guess[i]);
       guess[i] = hit.triangle;

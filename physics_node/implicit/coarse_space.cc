@@ -15,7 +15,7 @@ namespace {
 /// Coarse nodes over the membrane. With those of the lattice they are some 250 in built-in, so the factor has some 750
 /// rows. Assumed.
 constexpr int kCoarseRows = 9, kCoarseColumns = 4;
-/// Distance of the nodes of the lattice over the organ [m]: the outer radius of built-in. With 30 mm the organ's
+/// Distance of the nodes of the lattice over a single organ [m]: the outer radius of built-in. With 30 mm the organ's
 /// ovalling, which is soft, converges slowly (deploy/docs/measurements/physics, Lattice over the organ).
 constexpr double kLattice_m = 0.018;
 /// Rows of the membrane, and afterwards columns of blocks of the factor, that one step adds to the next matrix.
@@ -183,7 +183,8 @@ struct CoarseSpace::Lattice {
 /// theirs.
 CoarseSpace::Lattice CoarseSpace::LatticeOf(const Solid& solid, std::size_t solids, const ElasticModel& model) {
   constexpr double kFiner = 0.75, kFinest_m = 0.002;
-  constexpr std::size_t kMostNodes = 96, kVerticesPerNode = 8, kLeastNodes = 27;
+  // A lattice has at least the nodes of one cell.
+  constexpr std::size_t kMostNodes = 96, kVerticesPerNode = 8, kLeastNodes = 8;
   // Of all solids but the organ: matrix and factor grow with the square of the number.
   constexpr std::size_t kNodesOfAll = 480;
   const std::span<const Vec3d> points = std::span(model.rest_position).subspan(solid.first_vertex, solid.vertex_count);
@@ -203,12 +204,13 @@ CoarseSpace::Lattice CoarseSpace::LatticeOf(const Solid& solid, std::size_t soli
     }
     return keys.size();
   };
-  const std::size_t share = solid.first_vertex == 0 ? points.size() : std::max(kLeastNodes, kNodesOfAll / (solids - 1));
-  const std::size_t most = std::min(std::max(kMostNodes, points.size() / kVerticesPerNode), share);
+  const std::size_t share = solid.first_vertex == 0 ? points.size() : kNodesOfAll / (solids - 1);
+  const std::size_t most =
+      std::max(kLeastNodes, std::min(std::max(kMostNodes, points.size() / kVerticesPerNode), share));
   while (nodes(lattice) > most) lattice.spacing /= kFiner;
   for (Lattice finer = lattice; finer.spacing > kFinest_m; lattice = finer) {
     finer.spacing *= kFiner;
-    if (nodes(finer) > std::min({kMostNodes, points.size(), share})) break;
+    if (nodes(finer) > std::min({kMostNodes, points.size(), most})) break;
   }
   return lattice;
 }

@@ -5,7 +5,7 @@
 //
 //   D  blocks of the diagonal (kernels)
 //   H  hats: bilinear functions on every fourth row and column of the membrane, B blocks of H^T A H
-//   P  coarse nodes: bilinear in the rows and columns of the membrane, trilinear on a lattice over the organ. Over the
+//   P  coarse nodes: bilinear in the rows and columns of the membrane, trilinear on a lattice over each solid. Over the
 //      membrane P = H P_hats, so the coarse nodes work on the hats' residual and correction
 //
 // The Galerkin matrix P^T A P is factored (coarse_factor.h). Hats and coarse nodes follow cuts, sleep and contacts.

@@ -1,5 +1,5 @@
-// A solid's surface: serosa with longitudinal muscle and small vessels, in the colours of the solid. coordinate: place at rest along the
-// organ's axis and in both directions across it [m], and share of the normal along the third axis.
+// A solid's surface: serosa with longitudinal muscle and small vessels, in the colours of the solid. coordinate: place
+// at rest along the solid's axis and in both directions across it [m], and share of the normal along the third axis.
 in vec3 position;
 in vec3 normal;
 in vec4 coordinate;

@@ -41,7 +41,7 @@ std::string SceneFile(const std::string& name) {
 void Explain(const std::string& text) {
   std::vector<config::KeyRule> found;
   // Keys of lists are known where a scene has them.
-  for (const char* scene : {"openhelp", "built-in", "dissection", "assisted"}) {
+  for (const char* scene : {"openhelp", "built-in", "dissection", "assisted", "gallbladder"}) {
     for (const config::KeyRule& rule :
          scene::SceneRules(runtime::ShareFolder() / "scenes" / (std::string(scene) + ".yaml"))) {
       const auto is_same = [&](const config::KeyRule& other) { return other.path == rule.path; };

@@ -25,6 +25,7 @@
 #include "services/scene/compiler/preview.h"
 #include "services/scene/compiler/scene_yaml.h"
 #include "services/scene/format/scene_file.h"
+#include "services/scene/format/validate.h"
 
 namespace fulcrum::scene_compiler {
 namespace {
@@ -151,6 +152,9 @@ void Compile(const Arguments& arguments) {
     const scene::CompiledScene compiled =
         scene::CompileScene(arguments.plain[0], arguments.data, stages.progress(), arguments.changes);
     Preview(compiled.data.View(), arguments.preview);
+    if (const auto bad = scene::FindFault(compiled.data.View())) {
+      throw InputError(arguments.plain[0] + ": section '" + bad->section + "': " + bad->reason);
+    }
     if (arguments.out.empty()) {
       if (!arguments.quiet) std::cout << scene::Describe(compiled.data.View(), scene::Measure(compiled.data.View()));
       return;

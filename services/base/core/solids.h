@@ -7,6 +7,8 @@
 
 namespace fulcrum {
 
+inline constexpr Index kMaxSolids = 25;  ///< Of a scene: the organ and others.
+
 /// By organ vertex: index in TissueScene::solids; 0 in a scene of one organ. Ranges that reach beyond the vertices are
 /// cut off.
 [[nodiscard]] inline std::vector<Index> SolidOfVertices(const TissueScene& scene) {

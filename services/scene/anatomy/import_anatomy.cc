@@ -166,7 +166,7 @@ Vec3d MiddleOf(const TriangleMesh& mesh) {
 }
 
 /// Some vertex of one is nearer to a triangle of the other.
-bool Touch(const TriangleMesh& one, const TriangleMesh& other, double reach) {
+bool AreNear(const TriangleMesh& one, const TriangleMesh& other, double reach) {
   const TriangleLocator locator(other.vertices, other.triangles);
   return std::ranges::any_of(one.vertices,
                              [&](const Vec3d& p) { return locator.Closest(p, reach).triangle != kNoIndex; });
@@ -177,10 +177,10 @@ const LabelUse& OrganOf(const std::vector<LabelUse>& uses) {
 }
 
 /// Edges of the tetrahedra, held sides and attachments of the deformable neighbours.
-void Solidify(const std::vector<LabelUse>& uses, const std::map<std::string, TriangleMesh>& surfaces, NewScene* scene) {
+void DescribeBodies(const std::vector<LabelUse>& uses, const std::map<std::string, TriangleMesh>& surfaces,
+                    NewScene* scene) {
   constexpr double kVertices = 6000, kMostOfOne = 1200, kTetsPerVertex = 5;  // Of all, beside membrane and organ.
-  constexpr double kTouch_mm = 2,
-                   kReach_m = 0.004;  // The surface of the tetrahedra is up to a quarter of their edge off.
+  constexpr double kTouch_mm = 2, kReach_m = 0.004;
   std::vector<NewNeighbour*> deformable;
   for (NewNeighbour& n : scene->neighbours) {
     if (!n.material.empty()) deformable.push_back(&n);
@@ -192,11 +192,14 @@ void Solidify(const std::vector<LabelUse>& uses, const std::map<std::string, Tri
     const TriangleMesh& mesh = surfaces.at(n.surface.name);
     // A regular tetrahedron has edge^3 / (6 sqrt 2).
     n.tet_edge_mm = std::clamp(std::cbrt(6 * std::numbers::sqrt2 * EnclosedVolume(mesh) / tets), 0.5, 50.0);
-    n.held_side = (MiddleOf(mesh) - MiddleOf(organ)).normalized();
-    if (Touch(mesh, organ, kTouch_mm)) scene->attach.push_back({n.surface.name, "organ", kReach_m});
+    const Vec3d away = MiddleOf(mesh) - MiddleOf(organ);
+    if (away.norm() > 0) n.held_side = away.normalized();
+    // The surface of the tetrahedra is up to a quarter of their edge off.
+    const double reach = std::max(kReach_m, 0.4e-3 * n.tet_edge_mm);
+    if (AreNear(mesh, organ, kTouch_mm)) scene->attach.push_back({n.surface.name, "organ", reach});
     for (std::size_t j = 0; j < i; ++j) {
       const std::string& other = deformable[j]->surface.name;
-      if (Touch(mesh, surfaces.at(other), kTouch_mm)) scene->attach.push_back({n.surface.name, other, kReach_m});
+      if (AreNear(mesh, surfaces.at(other), kTouch_mm)) scene->attach.push_back({n.surface.name, other, reach});
     }
   }
 }
@@ -236,6 +239,9 @@ LabelUses ReadLabelUses(const fs::path& file) {
     use.material = entry.TextOr("material", "", 31);
     if (!use.material.empty() && FindMaterial(use.material) == nullptr) {
       entry.Fail("material", "'" + use.material + "' is not one of " + MaterialNames());
+    }
+    if (!use.material.empty() && use.name == "organ") {
+      entry.Fail("name", "'organ' means the one under the membrane; give a deformable body another name");
     }
     if (use.is_organ && !use.material.empty()) {
       entry.Fail("material", "is for the others: the scene's `physics` has the organ's modulus");
@@ -370,7 +376,7 @@ std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const P
     }
     reports.push_back(report);
   }
-  Solidify(uses, surfaces, &scene);
+  DescribeBodies(uses, surfaces, &scene);
   scene.mesh_text = OrganOf(uses).name + ".ply";
   scene.mesh = import.out / scene.mesh_text;
   const fs::path yaml = import.out / (import.name + ".yaml");

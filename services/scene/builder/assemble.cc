@@ -77,7 +77,7 @@ void CheckCounts(const SceneSettings& settings, const Anatomy& anatomy) {
     Refuse(settings, std::to_string(total) + " vertices (" + std::to_string(anatomy.sheet.size()) +
                          " of them in the membrane); valid: at most " + std::to_string(kMaxTissueVertices) + " and " +
                          std::to_string(kMaxMembraneNodes) +
-                         ". Lower membrane rows or columns, or the size of the organ");
+                         ". Lower membrane rows or columns, or the number of tetrahedra of the organ or of a body");
   }
   if ((m.rows - 1) % m.bending_row_stride != 0 || (m.cols - 1) % m.bending_col_stride != 0) {
     Refuse(settings, "the bending strides (" + std::to_string(m.bending_row_stride) + ", " +
@@ -263,10 +263,14 @@ void AddMembrane(const SceneSettings& settings, SceneData* scene) {
   }
 }
 
-void AddBindings(const SceneSettings& settings, const Anatomy& anatomy, const std::vector<Vec3d>& organ_vertices,
+void AddBindings(const SceneSettings& settings, const Anatomy& anatomy, const std::vector<Vec3d>& vertices,
                  SceneData* scene) {
   const MembraneSettings& m = settings.membrane;
-  const TriangleLocator locator(organ_vertices, scene->tube_surface);
+  std::vector<Triangle> surface;
+  for (const Triangle& t : scene->tube_surface) {
+    if (t[0] < anatomy.solids[0].vertices.size()) surface.push_back(t);
+  }
+  const TriangleLocator locator(vertices, surface);
   for (int r = m.binding_row_stride / 2; r < m.rows; r += m.binding_row_stride) {
     for (int c = m.binding_col_stride / 2 + 1; c < m.cols; c += m.binding_col_stride) {
       const std::size_t i = static_cast<std::size_t>(r) * m.cols + c;
@@ -275,7 +279,7 @@ void AddBindings(const SceneSettings& settings, const Anatomy& anatomy, const st
       if (hit.triangle == kNoIndex || scene->inverse_mass[particle] == 0) {
         continue;
       }
-      Binding binding{particle, scene->tube_surface[hit.triangle], {}, static_cast<float>(hit.closest.distance)};
+      Binding binding{particle, surface[hit.triangle], {}, static_cast<float>(hit.closest.distance)};
       for (int k = 0; k < 3; ++k) {
         binding.barycentric[k] = static_cast<float>(hit.closest.barycentric[k]);
       }
@@ -294,6 +298,10 @@ void AddBindings(const SceneSettings& settings, const Anatomy& anatomy, const st
 void AddAttachments(const SceneSettings& settings, const Anatomy& anatomy, const std::vector<Vec3d>& vertices,
                     SceneData* scene) {
   constexpr double kLeastLength_m = 1e-3;  // Of the column, where bodies touch.
+  constexpr double kStiffest_N_per_m = 1e5;
+  if (!settings.attach.empty() && settings.physics.mode != PhysicsMode::kAccurate) {
+    Refuse(settings, "attach: only `physics.mode: accurate` has attachments");
+  }
   const std::vector<Index> solid = SolidOfVertices(scene->View());
   const auto find = [&](const std::string& name) {
     const auto at = std::ranges::find(anatomy.solids, name, &SolidBody::name);
@@ -318,8 +326,8 @@ void AddAttachments(const SceneSettings& settings, const Anatomy& anatomy, const
       if (hit.triangle == kNoIndex) continue;
       Attachment a{v, surface[hit.triangle], {}, 0};
       for (int k = 0; k < 3; ++k) a.barycentric[k] = static_cast<float>(hit.closest.barycentric[k]);
-      a.stiffness_N_per_m =
-          static_cast<float>(attach.youngs_modulus_Pa * area[v] / std::max(hit.closest.distance, kLeastLength_m));
+      const double stiffness = attach.youngs_modulus_Pa * area[v] / std::max(hit.closest.distance, kLeastLength_m);
+      a.stiffness_N_per_m = static_cast<float>(std::min(stiffness, kStiffest_N_per_m));
       scene->attachments.push_back(a);
     }
     if (scene->attachments.size() == before) {

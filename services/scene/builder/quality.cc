@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "services/base/core/solids.h"
 #include "services/scene/builder/geometry.h"
 
 namespace fulcrum::scene {
@@ -164,10 +165,21 @@ std::string Describe(const SceneView& s, const SceneQuality& q) {
     text += line;
     text += '\n';
   };
-  add("  vertices   %zu: organ %zu, membrane %u x %u", q.vertices, q.organ_vertices, s.membrane.rows, s.membrane.cols);
+  add(s.solids.empty() ? "  vertices   %zu: organ %zu, membrane %u x %u"
+                       : "  vertices   %zu: solids %zu, membrane %u x %u",
+      q.vertices, q.organ_vertices, s.membrane.rows, s.membrane.cols);
   for (const Solid& solid : s.solids) {
     add("  body       %s: %u vertices, %.3g kPa", solid.name, solid.vertex_count,
         1e-3 * static_cast<double>(solid.youngs_modulus_Pa));
+  }
+  const std::vector<Index> solid_of = SolidOfVertices(s);
+  std::vector<bool> is_loose(s.solids.size(), true);
+  for (std::size_t v = 0; v < solid_of.size() && !s.solids.empty(); ++v) {
+    if (s.inverse_mass[v] == 0) is_loose[solid_of[v]] = false;
+  }
+  for (const Attachment& a : s.attachments) is_loose[solid_of[a.vertex]] = is_loose[solid_of[a.surface[0]]] = false;
+  for (std::size_t i = 0; i < s.solids.size(); ++i) {
+    if (is_loose[i]) add("  loose      %s: neither held nor attached, so gravity lets it fall", s.solids[i].name);
   }
   if (!s.attachments.empty()) add("  attached   by %zu springs", s.attachments.size());
   add("  stretch    %zu: organ %zu, membrane %zu (and %zu bindings)", q.organ_springs + q.membrane_springs,

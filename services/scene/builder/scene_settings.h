@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "services/base/core/scene_view.h"
+#include "services/base/core/solids.h"
 #include "services/scene/builder/materials.h"
 #include "services/scene/builder/operator_hand.h"
 
@@ -33,8 +34,8 @@ struct TubeSettings {
   BrickSplit split = BrickSplit::kSix;
 };
 
-inline constexpr int kMostSurroundings = 16;  ///< Of an imported organ.
-inline constexpr int kMostBodies = 24;        ///< Beside the organ.
+inline constexpr int kMostSurroundings = 16;        ///< Of an imported organ.
+inline constexpr int kMostBodies = kMaxSolids - 1;  ///< Beside the organ.
 
 /// A body of simple shape: an ellipsoid, or what a circle sweeps along a smooth curve, rounded at both ends.
 struct ShapeSettings {

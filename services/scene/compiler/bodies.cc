@@ -6,6 +6,7 @@
 #include "services/scene/compiler/mesh_repair.h"
 #include "services/scene/compiler/say.h"
 #include "services/scene/compiler/shapes.h"
+#include "services/scene/compiler/spot.h"
 
 namespace fulcrum::scene {
 namespace {
@@ -60,12 +61,24 @@ SolidBody Build(const BodySettings& settings, const ImportSettings& like, const 
   return body;
 }
 
+/// Build, with the body's name in front of a refusal.
+SolidBody BuildNamed(const BodySettings& settings, const ImportSettings& like, const Progress& progress) {
+  try {
+    return Build(settings, like, progress);
+  } catch (const SpotError&) {
+    throw;  // It names the body, and the place to draw.
+  } catch (const InputError& error) {
+    const std::string text = error.what();
+    throw InputError(text.starts_with(settings.name) ? text : "body '" + settings.name + "': " + text);
+  }
+}
+
 }  // namespace
 
 void AddBodies(const SceneSettings& settings, const Placement& placement, const Progress& progress, Anatomy* anatomy) {
   const ImportSettings like = settings.import.value_or(ImportSettings{});
   for (const BodySettings& wanted : settings.bodies) {
-    SolidBody body = Build(wanted, like, progress);
+    SolidBody body = BuildNamed(wanted, like, progress);
     for (auto* points : {&body.vertices, &body.surface_vertices}) {
       for (Vec3d& p : *points) p = placement.ToWorld(p);
     }

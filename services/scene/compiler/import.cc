@@ -72,6 +72,7 @@ Membrane DrapeAlong(const std::vector<Vec3d>& line, const Vec3d& facing, const S
 /// Over a patch, whose organ is fixed on the side that faces away.
 Membrane DrapeOver(const Placement& placement, const SceneSettings& settings, const std::vector<Vec3d>& organ_vertices,
                    const TriangleMesh& surface, const Progress& progress) {
+  // It lies in a bed that reaches so far up.
   double low = organ_vertices[0].z(), high = low;
   for (const Vec3d& p : organ_vertices) {
     low = std::min(low, p.z());

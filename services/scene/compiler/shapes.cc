@@ -6,12 +6,15 @@
 #include <cmath>
 #include <numbers>
 
+#include "services/base/core/error.h"
 #include "services/scene/builder/geometry.h"
+#include "services/scene/compiler/print_text.h"
 
 namespace fulcrum::scene {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
+constexpr int kMostStations = 2000;  ///< More vertices than a scene holds.
 
 /// Place on a swept shape's line, with directions across it that do not turn about it.
 struct Station {
@@ -45,6 +48,10 @@ std::vector<Station> StationsOf(const ShapeSettings& shape, double spacing) {
       radius.push_back((1 - smooth) * shape.radius_m[i] + smooth * shape.radius_m[i + 1]);
       length.push_back(length.empty() ? 0 : length.back() + (points.back() - points[points.size() - 2]).norm());
     }
+  }
+  if (length.back() > kMostStations * spacing) {
+    throw InputError(PrintText("a line of %.0f mm has rings every %.2f mm; valid: at most %d of them",
+                               1e3 * length.back(), 1e3 * spacing, kMostStations));
   }
   const int count = std::max(2, static_cast<int>(std::lround(length.back() / spacing)) + 1);
   std::vector<Station> stations;
@@ -155,9 +162,16 @@ TubeBody TubeOfShape(const ShapeSettings& shape, double spacing) {
       body.tets.vertices.push_back(side < 0 ? s.centre : Around(s, s.radius, side, kSides));
     }
   }
-  const auto add = [&](Tetrahedron t) {
+  const auto add = [&](Tetrahedron t, bool turned) {
     const auto& x = body.tets.vertices;
-    if (SignedVolume(x[t[0]], x[t[1]], x[t[2]], x[t[3]]) < 0) std::swap(t[2], t[3]);
+    if (turned) std::swap(t[2], t[3]);
+    if (!(SignedVolume(x[t[0]], x[t[1]], x[t[2]], x[t[3]]) > 0)) {
+      const Vec3d at = 1e3 * x[t[0]];
+      throw InputError(
+          PrintText("bends more tightly than its radius, or between two rings, near %.1f %.1f %.1f mm; "
+                    "give more points, a smaller radius or a smaller tet_edge_mm",
+                    at.x(), at.y(), at.z()));
+    }
     body.tets.tets.push_back(t);
   };
   for (int r = 0; r + 1 < rings; ++r) {
@@ -168,9 +182,11 @@ TubeBody TubeOfShape(const ShapeSettings& shape, double spacing) {
       std::sort(corner.begin(), corner.end());
       const auto low = [&](std::size_t k) { return id(r, corner[k]); };
       const auto high = [&](std::size_t k) { return id(r + 1, corner[k]); };
-      add({low(0), low(1), low(2), high(2)});
-      add({low(0), low(1), high(1), high(2)});
-      add({low(0), high(0), high(1), high(2)});
+      // At the last side the order of the numbers turns round.
+      const bool turned = side == kSides - 1;
+      add({low(0), low(1), low(2), high(2)}, turned);
+      add({low(0), low(1), high(2), high(1)}, turned);
+      add({low(0), high(0), high(1), high(2)}, turned);
     }
   }
   std::vector<Vec3d> vertices;

@@ -7,7 +7,7 @@
 
 namespace fulcrum::scene {
 
-/// The closed surface of a shape, seen from outside [m].
+/// The closed surface of a shape, seen from outside [m]. Throws InputError for a line that is too long for its radius.
 TriangleMesh SurfaceOfShape(const ShapeSettings& shape);
 
 struct TubeBody {
@@ -17,7 +17,7 @@ struct TubeBody {
 };
 
 /// A swept shape as rings of six vertices around its line, `spacing` apart, each wedge between them as three
-/// tetrahedra; the surface is rounder.
+/// tetrahedra; the surface is rounder. Throws InputError where it bends more tightly than its radius.
 TubeBody TubeOfShape(const ShapeSettings& shape, double spacing);
 
 }  // namespace fulcrum::scene

@@ -12,7 +12,7 @@ using config::Range;
 using config::StrictMap;
 
 constexpr std::size_t kMostShapePoints = 64;
-constexpr std::size_t kMostAttachments = 64;
+constexpr std::size_t kMostAttachments = 400;
 
 enum class Ends { kNone, kFirst, kLast, kBoth };
 const StrictMap::Choices<Ends> kEnds = {
@@ -44,8 +44,8 @@ Material ReadMaterial(StrictMap* map) {
   }
   Material material = named->material;
   material.look = map->Choice("look", material.look, kSolidLookNames);
-  ReadSi(map, "youngs_modulus_kPa", Range::Between(0.001, 1e6), &material.youngs_modulus_Pa);
-  ReadSi(map, "density_kg_m3", Range::Between(1, 1e5), &material.density_kg_m3);
+  ReadSi(map, "youngs_modulus_kPa", Range::Between(0.01, 1e4), &material.youngs_modulus_Pa);
+  ReadSi(map, "density_kg_m3", Range::Between(100, 2e4), &material.density_kg_m3);
   return material;
 }
 
@@ -54,7 +54,9 @@ BodySettings ReadBody(StrictMap map, const FindMesh& find) {
   body.name = map.Text("name", 31);
   body.material = ReadMaterial(&map);
   const int sources = (map.Has("mesh") ? 1 : 0) + (map.Has("shape") ? 1 : 0) + (map.Has("tube") ? 1 : 0);
-  if (sources != 1) map.Fail("name", "needs one of `mesh`, `shape` and `tube`");
+  if (sources == 0) map.Fail("name", "needs one of `mesh`, `shape` and `tube`");
+  if (sources > 1)
+    map.Fail(map.Has("tube") ? "tube" : "shape", "is one too many: give one of `mesh`, `shape` and `tube`");
   if (map.Has("mesh")) body.file = find(map, "mesh");
   if (auto shape = map.OptionalMap("shape")) body.shape = ReadShape(*shape);
   if (auto tube = map.OptionalMap("tube")) {
@@ -64,12 +66,14 @@ BodySettings ReadBody(StrictMap map, const FindMesh& find) {
   }
   body.offset_m = map.Vector3Si("offset_mm", body.offset_m, Range::Between(-1000, 1000));
   ReadSi(&map, "tet_edge_mm", Range::Between(0.5, 50), &body.tet_edge_m);
-  ReadInteger(&map, "triangles_max", 100, 100000, &body.surface_triangles_max);
   if (body.is_tube) {
     const Ends held = map.Choice("held_ends", Ends::kNone, kEnds);
     body.first_end_held = held == Ends::kFirst || held == Ends::kBoth;
     body.last_end_held = held == Ends::kLast || held == Ends::kBoth;
-  } else if (map.Has("held_side")) {
+    return body;
+  }
+  ReadInteger(&map, "triangles_max", 100, 100000, &body.surface_triangles_max);
+  if (map.Has("held_side")) {
     body.held_side = map.Vector3Si("held_side", Range::Between(-1, 1));
     if (!(body.held_side->norm() > 0.1f)) map.Fail("held_side", "must be a direction, not (nearly) zero");
     body.held_side->normalize();

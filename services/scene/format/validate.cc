@@ -154,6 +154,7 @@ void CheckSurfaces(const SceneView& s) {
 /// Each element within one solid, each solid a range after the last one.
 void CheckSolids(const SceneView& s) {
   if (s.solids.empty() && s.attachments.empty()) return;
+  if (s.solids.size() > kMaxSolids) Fail("solids", s.solids.size(), " of them; valid: at most ", kMaxSolids);
   std::uint64_t vertex = 0, surface_vertex = 0, surface_triangle = 0;
   const auto follow = [](std::size_t solid, const char* what, std::uint64_t first, std::uint64_t count,
                          std::uint64_t* end) {
@@ -165,6 +166,7 @@ void CheckSolids(const SceneView& s) {
     follow(i, "vertices", solid.first_vertex, solid.vertex_count, &vertex);
     follow(i, "surface vertices", solid.first_surface_vertex, solid.surface_vertex_count, &surface_vertex);
     follow(i, "surface triangles", solid.first_surface_triangle, solid.surface_triangle_count, &surface_triangle);
+    CheckRange("solids", "number of vertices", i, solid.vertex_count, 4, s.tube_vertex_count);
     CheckRange("solids", "Young's modulus", i, solid.youngs_modulus_Pa, 1, 1e9);
     if (std::memchr(solid.name, 0, sizeof(solid.name)) == nullptr ||
         static_cast<std::uint32_t>(solid.look) >= kSolidLooks) {
@@ -185,6 +187,7 @@ void CheckSolids(const SceneView& s) {
   for (std::size_t i = 0; i < s.tets.size(); ++i) one_solid("tets", i, s.tets[i]);
   for (std::size_t i = 0; i < s.tube_edges.size(); ++i) one_solid("tube_edges", i, ParticlesOf(s.tube_edges[i]));
   for (std::size_t i = 0; i < s.tube_surface.size(); ++i) one_solid("tube_surface", i, s.tube_surface[i]);
+  for (std::size_t i = 0; i < s.bindings.size(); ++i) one_solid("bindings", i, s.bindings[i].surface);
   for (std::size_t i = 0; i < s.solids.size(); ++i) {
     const Solid& solid = s.solids[i];
     const Index first = solid.first_surface_vertex, end = first + solid.surface_vertex_count;
@@ -208,7 +211,7 @@ void CheckSolids(const SceneView& s) {
     CheckRange("attachments", "stiffness", i, a.stiffness_N_per_m, 0, 1e6);
   }
   if (!s.attachments.empty() && s.physics.mode != PhysicsMode::kAccurate) {
-    Fail("attachments", s.attachments.size(), " of them; valid in another mode than accurate: none");
+    Fail("attachments", s.attachments.size(), " of them; only mode accurate has any");
   }
 }
 

@@ -238,6 +238,9 @@ TEST_F(Segmentation, UsesOfLabelsAreChecked) {
   EXPECT_NE(refusal("labels:\n  - {label: 1, name: a, organ: true}\n  - {label: 2, name: b, material: cheese}\n")
                 .find("artery, bile_duct"),
             std::string::npos);
+  EXPECT_NE(refusal("labels:\n  - {label: 1, name: a, organ: true}\n  - {label: 2, name: organ, material: fat}\n")
+                .find("another name"),
+            std::string::npos);
   EXPECT_NE(refusal("labels:\n  - {label: 1, name: a, organ: true, material: liver}\n").find("is for the others"),
             std::string::npos);
   EXPECT_NE(refusal("labels:\n  - {label: 1, name: ../a, organ: true}\n").find("it names a file"), std::string::npos);

@@ -1,10 +1,15 @@
 // Several solids in one scene: stiffness of their own, contact with each other, what joins them, sleep, determinism.
+#include "services/base/core/solids.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "physics_node/energy/elastic_model.h"
+#include "physics_node/simulation/script_player.h"
 #include "physics_node/simulation/tissue_simulation.h"
+#include "services/scene/compiler/compile.h"
 #include "tests/support/several_solids.h"
 
 namespace fulcrum::physics {
@@ -56,6 +61,32 @@ TEST_F(OnSeveralSolids, HaveTheModulusOfTheirOwn) {
     EXPECT_NEAR(tet.scale * organ_Pa, static_cast<double>(solid->youngs_modulus_Pa), 1);
   }
   EXPECT_GT(model.attachments.size(), 3u);
+}
+
+TEST_F(OnSeveralSolids, TheModulusOfOneScalesItsPartOfTheMatrixOnly) {
+  scene::SceneData stiffer = data_;
+  stiffer.solids[kPad].youngs_modulus_Pa *= 3;
+  const ElasticModel one = BuildElasticModel(scene_), other = BuildElasticModel(stiffer.View());
+  const auto of_pad = [&](Index v) {
+    return v >= scene_.solids[kPad].first_vertex &&
+           v < scene_.solids[kPad].first_vertex + scene_.solids[kPad].vertex_count;
+  };
+  ASSERT_EQ(one.patches.size(), other.patches.size());
+  double volume = 0;
+  for (std::size_t i = 0; i < one.patches.size(); ++i) {
+    const double factor = of_pad(one.patches[i].vertex) ? 3 : 1;
+    EXPECT_NEAR(other.patches[i].volume, factor * one.patches[i].volume, 1e-6 * other.patches[i].volume);
+    if (of_pad(one.patches[i].vertex)) volume += one.patches[i].volume;
+  }
+  // Against the organ's modulus, to which the model's Lame parameters belong.
+  const double scale =
+      static_cast<double>(scene_.solids[kPad].youngs_modulus_Pa / scene_.physics.tube_youngs_modulus_Pa);
+  EXPECT_NEAR(volume, scale * 0.04 * 0.04 * 0.015, 1e-9);
+  for (std::size_t i = 0; i < one.shear_links.size(); ++i) {
+    const double factor = of_pad(one.shear_links[i].a) ? 3 : 1;
+    EXPECT_NEAR(other.shear_links[i].stiffness, factor * one.shear_links[i].stiffness,
+                1e-6 * std::abs(other.shear_links[i].stiffness) + 1e-9);
+  }
 }
 
 TEST_F(OnSeveralSolids, StayAtRestAndSleep) {
@@ -133,6 +164,49 @@ TEST_F(UnderGravity, AreTheSameOnAnyNumberOfThreads) {
     three.Step({});
     ASSERT_EQ(one.StateHash(), three.StateHash()) << "step " << i;
   }
+}
+
+TEST_F(UnderGravity, ALooseOneIsCaughtFromFarAbove) {
+  const Solid& lump = scene_.solids[kLump];
+  for (Index v = lump.first_vertex; v < lump.first_vertex + lump.vertex_count; ++v) data_.rest_position[v].z() += 0.1f;
+  TissueSimulation simulation(scene_);
+  for (int i = 0; i < 200; ++i) simulation.Step({});
+  EXPECT_GT(Bottom(simulation, kLump), 0.010f);
+  EXPECT_LT(Bottom(simulation, kLump), 0.020f);
+}
+
+TEST(ASolidOfOneTetrahedron, HasALattice) {
+  scene::SceneSettings settings = scene::Small();
+  settings.physics.mode = PhysicsMode::kAccurate;
+  scene::Anatomy anatomy = scene::ProceduralAnatomy(settings);
+  for (int i = 1; i < static_cast<int>(kMaxSolids); ++i) {
+    scene::SolidBody one;
+    one.name = "one";
+    const Vec3d at(0.1 + 0.02 * i, 0, 0);
+    one.vertices = {at, at + Vec3d(0.01, 0, 0), at + Vec3d(0, 0.01, 0), at + Vec3d(0, 0, 0.01)};
+    one.tets = {{0, 1, 2, 3}};
+    one.fixed = {true, true, true, false};
+    one.surface_vertices = one.vertices;
+    one.surface_triangles = scene::BoundaryOf(one.tets);
+    anatomy.solids.push_back(one);
+  }
+  const scene::SceneData data = scene::AssembleScene(settings, anatomy);
+  TissueSimulation simulation(data.View());
+  for (int i = 0; i < 20; ++i) simulation.Step({});
+  EXPECT_LT(simulation.MaxDisplacement(), 1e-5f);
+}
+
+/// The shipped scene: the fundus is held and follows, nothing is reset.
+TEST(TheGallbladder, FollowsTheGrasper) {
+  const scene::SceneData data =
+      scene::CompileScene(std::filesystem::path(FULCRUM_SOURCE_DIR) / "deploy/scenes/gallbladder.yaml", {}, {}).data;
+  const SceneView scene = data.View();
+  TissueSimulation simulation(scene);
+  for (int i = 0; i < 600; ++i) simulation.Step(ScriptedTools(scene, 0.01 * i));
+  EXPECT_TRUE(simulation.grasp(0).holding());
+  EXPECT_GT(simulation.MaxDisplacement(), 0.008f);
+  EXPECT_LT(simulation.MaxDisplacement(), 0.025f);
+  EXPECT_EQ(simulation.quarantined(), 0u);
 }
 
 }  // namespace

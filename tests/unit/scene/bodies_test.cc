@@ -119,6 +119,33 @@ TEST(Bodies, ATubeFollowsItsLine) {
   EXPECT_NEAR(EnclosedVolume(tube.surface) / volume, std::numbers::pi / (1.5 * std::sqrt(3.0)), 0.08);
 }
 
+TEST(Bodies, ATubeThatFoldsIsRefused) {
+  ShapeSettings shape;
+  shape.line_m = {Vec3f(0, 0, 0), Vec3f(0.015f, 0, 0), Vec3f(0.015f, 0.015f, 0)};
+  shape.radius_m = {0.006, 0.006, 0.006};
+  EXPECT_THROW((void)TubeOfShape(shape, 0.012), InputError);
+  for (double& r : shape.radius_m) r = 0.002;
+  const TubeBody tube = TubeOfShape(shape, 0.002);
+  double volume = 0;
+  for (const Tetrahedron& t : tube.tets.tets) {
+    const auto& x = tube.tets.vertices;
+    volume += SignedVolume(x[t[0]], x[t[1]], x[t[2]], x[t[3]]);
+  }
+  EXPECT_NEAR(EnclosedVolume({tube.tets.vertices, BoundaryOf(tube.tets.tets)}), volume, 1e-12);
+  shape.line_m = {Vec3f(-5, 0, 0), Vec3f(5, 0, 0)};
+  shape.radius_m = {0.0003, 0.0003};
+  EXPECT_THROW((void)SurfaceOfShape(shape), InputError) << "too many rings";
+}
+
+TEST(Bodies, TheMembraneIsBoundToTheOrganOnly) {
+  // A body within reach of the membrane, on its other side.
+  const SceneData data = BuildScene(SmallWith("bodies: [{name: a, material: liver, tet_edge_mm: 5,\n"
+                                              "  shape: {ellipsoid_mm: [12, 12, 6], at_mm: [0, 0, 36]}}]\n"),
+                                    {});
+  ASSERT_EQ(data.solids.size(), 2u);
+  for (const Binding& binding : data.bindings) EXPECT_LT(binding.surface[0], data.solids[1].first_vertex);
+}
+
 TEST(Bodies, ASweptShapeIsClosedAndRound) {
   ShapeSettings shape;
   shape.line_m = {Vec3f(0, 0, 0), Vec3f(0, 0.05f, 0)};
@@ -161,6 +188,10 @@ TEST(Bodies, BadOnesAreRefused) {
       {"bodies: [{name: a, material: liver, shape: {ellipsoid_mm: [15, 15, 15], at_mm: [0, 0, 150]}}]\n"
        "attach: [{from: a, to: organ, reach_mm: 2}]\n",
        "within 2 mm"},
+      {"bodies: [{name: bent, material: artery, tet_edge_mm: 12, tube: {x_mm: [0, 15, 15], y_mm: [0, 0, 15],\n"
+       "  z_mm: [90, 90, 90], radius_mm: [6]}}]\n",
+       "body 'bent': bends more tightly"},
+      {"bodies: [{name: a, material: liver, shape: {ellipsoid_mm: [9, 9, 9]}, mesh: a.stl}]\n", "one too many"},
   };
   for (const Refused& refused : all) {
     EXPECT_NE(RefusalOf(refused.lines).find(refused.reason), std::string::npos)
@@ -170,25 +201,29 @@ TEST(Bodies, BadOnesAreRefused) {
 
 TEST(Bodies, FaultsOfAFileAreFound) {
   const SceneData good = BuildScene(SmallWith(kBodies), {});
-  const std::vector<std::function<void(SceneData&)>> faults = {
-      [](SceneData& s) { s.solids[1].first_vertex += 1; },
-      [](SceneData& s) { s.solids[2].vertex_count -= 1; },
-      [](SceneData& s) { s.solids[0].surface_triangle_count += 1; },
-      [](SceneData& s) { s.solids[1].youngs_modulus_Pa = NAN; },
-      [](SceneData& s) { s.solids[1].look = static_cast<SolidLook>(99); },
-      [](SceneData& s) { std::fill(std::begin(s.solids[1].name), std::end(s.solids[1].name), 'x'); },
-      [](SceneData& s) { s.attachments[0].vertex = s.fixed.tube_vertex_count; },
-      [](SceneData& s) { s.attachments[0].surface[1] = 0; },
-      [](SceneData& s) { s.attachments[0].vertex = s.attachments[0].surface[0]; },
-      [](SceneData& s) { s.attachments[0].stiffness_N_per_m = INFINITY; },
-      [](SceneData& s) { s.fixed.physics.mode = PhysicsMode::kXpbd; },
-      [](SceneData& s) { std::swap(s.tets[0][0], s.tets[s.tets.size() - 1][0]); },
-      [](SceneData& s) { s.solids.pop_back(); },
+  const std::vector<std::pair<const char*, std::function<void(SceneData&)>>> faults = {
+      {"solids", [](SceneData& s) { s.solids[1].first_vertex += 1; }},
+      {"solids", [](SceneData& s) { s.solids[2].vertex_count -= 1; }},
+      {"solids", [](SceneData& s) { s.solids[0].surface_triangle_count += 1; }},
+      {"solids", [](SceneData& s) { s.solids[1].youngs_modulus_Pa = NAN; }},
+      {"solids", [](SceneData& s) { s.solids[1].look = static_cast<SolidLook>(99); }},
+      {"solids", [](SceneData& s) { std::fill(std::begin(s.solids[1].name), std::end(s.solids[1].name), 'x'); }},
+      {"attachments", [](SceneData& s) { s.attachments[0].vertex = s.fixed.tube_vertex_count; }},
+      {"attachments", [](SceneData& s) { s.attachments[0].surface[1] = 0; }},
+      {"attachments", [](SceneData& s) { s.attachments[0].vertex = s.attachments[0].surface[0]; }},
+      {"attachments", [](SceneData& s) { s.attachments[0].stiffness_N_per_m = INFINITY; }},
+      {"attachments", [](SceneData& s) { s.fixed.physics.mode = PhysicsMode::kXpbd; }},
+      {"tets", [](SceneData& s) { std::swap(s.tets[0][0], s.tets[s.tets.size() - 1][0]); }},
+      {"solids", [](SceneData& s) { s.solids.pop_back(); }},
+      {"solids", [](SceneData& s) { s.solids.resize(kMaxSolids + 1, s.solids[2]); }},
+      {"bindings", [](SceneData& s) { s.bindings[0].surface[1] = s.solids[1].first_vertex; }},
   };
   for (std::size_t i = 0; i < faults.size(); ++i) {
     SceneData bad = good;
-    faults[i](bad);
-    EXPECT_TRUE(FindFault(bad.View())) << i;
+    faults[i].second(bad);
+    const auto fault = FindFault(bad.View());
+    ASSERT_TRUE(fault) << i;
+    EXPECT_EQ(fault->section, faults[i].first) << i << ": " << fault->reason;
   }
 }
 

@@ -109,6 +109,20 @@ TEST(ShippedScenes, OpenHelpGivesASoundSceneOrSaysWhatIsMissing) {
       << "meshing must be reproducible";
 }
 
+TEST(ShippedScenes, TheGallbladderIsAmongItsNeighbours) {
+  const SceneData data = CompileScene(kScenes / "gallbladder.yaml", {}, {}).data;
+  const SceneView view = data.View();
+  const auto fault = FindFault(view);
+  EXPECT_FALSE(fault) << fault->section << ": " << fault->reason;
+  ASSERT_EQ(view.solids.size(), 6u);
+  EXPECT_EQ(view.solids[0].look, SolidLook::kGallbladder);
+  EXPECT_GT(view.attachments.size(), 40u) << "its bed, duct and artery";
+  const SceneQuality q = Measure(view);
+  EXPECT_GT(q.least_dihedral_deg, 5);
+  EXPECT_EQ(q.inverted_tets, 0u);
+  EXPECT_EQ(CompileScene(kScenes / "gallbladder.yaml", {}, {}).data.fixed.hash, view.hash);
+}
+
 // ---------------------------------------------------------------------------------------------------- refusals
 
 struct Rule {
