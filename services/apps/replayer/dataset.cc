@@ -106,7 +106,8 @@ class DatasetMaker {
     auto truth = std::make_unique<const Truth>(*std::move(frame.moment));
     const std::uint64_t i = frame.index;
     if (i == 0) {
-      WriteText(settings_.folder / "calibration.json", CalibrationText(truth->camera(), settings_.baseline_m));
+      WriteText(settings_.folder / "calibration.json",
+                CalibrationText(truth->camera(), settings_.baseline_m, scene_.solids));
     }
     Write("left", i, FromBitmap(frame.left));
     if (settings_.baseline_m > 0) Write("right", i, FromBitmap(frame.right));

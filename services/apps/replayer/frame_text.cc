@@ -7,6 +7,7 @@
 #include "render_node/geometry/solid.h"
 #include "services/apps/replayer/report_format.h"
 #include "services/base/core/contact_force.h"
+#include "services/base/core/json_text.h"
 
 namespace fulcrum::replay {
 namespace {
@@ -58,7 +59,7 @@ RenderParams RightOf(const RenderParams& camera, double baseline_m) {
   return moved;
 }
 
-std::string CalibrationText(const render::Pinhole& camera, double baseline_m) {
+std::string CalibrationText(const render::Pinhole& camera, double baseline_m, std::span<const Solid> solids) {
   std::string text = Format(
       "{\n  \"width\": %d,\n  \"height\": %d,\n  \"fx\": %.6f,\n  \"fy\": %.6f,\n  \"cx\": %.3f,\n  \"cy\": %.3f,\n"
       "  \"field_radius\": %.3f,\n  \"baseline_m\": %.6f,\n",
@@ -71,8 +72,15 @@ std::string CalibrationText(const render::Pinhole& camera, double baseline_m) {
   for (int k = 0; k < kTruthClasses; ++k) {
     text += Format("%s\"%s\"", k > 0 ? ", " : "", NameOf(static_cast<TruthClass>(k)));
   }
-  return text + Format("],\n  \"first_tool_instance\": %d,\n  \"first_organ_instance\": %d\n}\n", kFirstToolInstance,
-                       kFirstOrganInstance);
+  text += Format("],\n  \"first_tool_instance\": %d,\n  \"first_organ_instance\": %d,\n  \"organs\": [",
+                 kFirstToolInstance, kFirstOrganInstance);
+  const char* separator = "";
+  for (const Solid& solid : solids) {
+    if (solid.look == SolidLook::kBowel) continue;
+    text += separator + JsonString(solid.name);
+    separator = ", ";
+  }
+  return text + "]\n}\n";
 }
 
 FrameState::FrameState(const render::RenderNode& node, const ContactModel& contacts)

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 
 #include "render_node/node/render_node.h"
@@ -13,8 +14,9 @@ namespace fulcrum::replay {
 /// The camera moved to its right [m]; both look in the same direction.
 [[nodiscard]] RenderParams RightOf(const RenderParams& camera, double baseline_m);
 
-/// Intrinsics of both cameras, units of the images, names of the classes.
-[[nodiscard]] std::string CalibrationText(const render::Pinhole& camera, double baseline_m);
+/// Intrinsics of both cameras, units of the images, names of the classes and of the organs that have instances.
+[[nodiscard]] std::string CalibrationText(const render::Pinhole& camera, double baseline_m,
+                                          std::span<const Solid> solids);
 
 /// What a line needs of the renderer.
 struct FrameState {

@@ -4,6 +4,7 @@
 #include <array>
 #include <string_view>
 
+#include "services/base/core/solids.h"
 #include "services/base/picture/solid_view.h"
 #include "services/scene/builder/geometry.h"
 #include "services/scene/compiler/placement.h"
@@ -16,11 +17,14 @@ using picture::Rgb;
 using picture::SolidView;
 
 constexpr int kWidth = 640, kHeight = 480, kGap = 4;
-constexpr Rgb kPaper{250, 250, 248}, kInk{30, 36, 44}, kOrgan{214, 128, 112}, kFixed{150, 146, 150},
-    kMembrane{240, 214, 150}, kGrid{176, 142, 74}, kAround{196, 202, 210}, kUreter{70, 120, 220}, kNerve{240, 200, 40},
-    kMark{214, 0, 90};
+constexpr Rgb kPaper{250, 250, 248}, kInk{30, 36, 44}, kFixed{150, 146, 150}, kMembrane{240, 214, 150},
+    kGrid{176, 142, 74}, kAround{196, 202, 210}, kUreter{70, 120, 220}, kNerve{240, 200, 40}, kMark{214, 0, 90};
 constexpr std::array<Rgb, kMaxTools> kToolColours = {Rgb{20, 110, 200}, Rgb{20, 140, 70}, Rgb{150, 60, 170},
                                                      Rgb{120, 90, 40}};
+/// By SolidLook: bowel, bladder, liver, gallbladder, fat, muscle, artery, vein, ureter, nerve.
+constexpr std::array<Rgb, kSolidLooks> kSolidColours = {
+    Rgb{214, 128, 112}, Rgb{228, 176, 150}, Rgb{150, 74, 62}, Rgb{150, 176, 110}, Rgb{236, 206, 110},
+    Rgb{184, 84, 76},   Rgb{206, 44, 40},   Rgb{92, 84, 160}, Rgb{222, 196, 172}, Rgb{240, 226, 170}};
 /// A line on a surface is seen although it lies within this depth behind it.
 constexpr double kSlack_m = 0.0008;
 constexpr double kFill = 0.85;  ///< Share of a view that the organ takes up.
@@ -74,9 +78,11 @@ class ScenePainter {
  public:
   explicit ScenePainter(const SceneView& scene)
       : scene_(scene), rest_(Doubles(scene.rest_position)), around_(Doubles(scene.static_vertices)) {
+    const std::vector<Index> solid = SolidOfVertices(scene);
     for (const Triangle& t : scene.tube_surface) {
       const bool is_fixed = std::all_of(t.begin(), t.end(), [&](Index v) { return scene.inverse_mass[v] == 0; });
-      (is_fixed ? fixed_ : free_).push_back(t);
+      const SolidLook look = scene.solids.empty() ? SolidLook::kBowel : scene.solids[solid[t[0]]].look;
+      (is_fixed ? fixed_ : free_[static_cast<std::size_t>(look)]).push_back(t);
     }
     const auto rows = static_cast<int>(scene.membrane.rows), cols = static_cast<int>(scene.membrane.cols);
     for (Triangle t : GridTriangles(rows, cols)) {
@@ -90,7 +96,7 @@ class ScenePainter {
 
   void Paint(SolidView* view) const {
     view->Solid(rest_, membrane_, kMembrane, true);
-    view->Solid(rest_, free_, kOrgan, false);
+    for (std::size_t look = 0; look < free_.size(); ++look) view->Solid(rest_, free_[look], kSolidColours[look], false);
     view->Solid(rest_, fixed_, kFixed, false);
     for (const StaticSurface& s : scene_.static_surfaces) {
       if (std::string_view(s.name) == "cavity") continue;  // Around everything.
@@ -141,7 +147,8 @@ class ScenePainter {
 
   const SceneView& scene_;
   std::vector<Vec3d> rest_, around_;
-  std::vector<Triangle> free_, fixed_, membrane_;
+  std::array<std::vector<Triangle>, kSolidLooks> free_;  ///< By look.
+  std::vector<Triangle> fixed_, membrane_;
   Bounds bounds_;
 };
 
@@ -178,7 +185,7 @@ std::string PictureOf(const Spot& spot) {
   above_near.label = beside_near.label = "close";
   return FourViews({above, beside, above_near, beside_near}, {whole, whole, near, near}, [&](SolidView* view, int i) {
     for (std::size_t m = 0; m < spot.meshes.size(); ++m) {
-      view->Solid(spot.meshes[m].vertices, spot.meshes[m].triangles, m == 0 ? kOrgan : kMembrane, true);
+      view->Solid(spot.meshes[m].vertices, spot.meshes[m].triangles, m == 0 ? kSolidColours[0] : kMembrane, true);
       if (i < 2) continue;
       for (const Triangle& t : spot.meshes[m].triangles) {
         for (std::size_t k = 0; k < 3; ++k) {
