@@ -36,8 +36,7 @@ TEST_P(GraspCutSoak, FiveThousandOperations) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, GraspCutSoak,
-                         testing::Values(std::pair{11u, false}, std::pair{12u, false}, std::pair{13u, true},
-                                         std::pair{14u, true}));
+                         testing::Values(std::pair{11u, false}, std::pair{12u, false}, std::pair{13u, true}));
 
 }  // namespace
 }  // namespace fulcrum::physics
