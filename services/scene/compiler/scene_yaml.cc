@@ -82,20 +82,6 @@ std::filesystem::path FindFile(const StrictMap& map, const std::string& key, con
   map.Fail(key, reason);
 }
 
-void ReadCentreline(StrictMap map, std::vector<Vec3f>* points) {
-  std::array<std::vector<double>, 3> axes;
-  const std::array keys = {"x_mm", "y_mm", "z_mm"};
-  for (std::size_t k = 0; k < 3; ++k) {
-    axes[k] = map.NumbersSi(keys[k], 2, kMaxPathPoints, Range::Between(-5000, 5000));
-    if (axes[k].size() != axes[0].size()) {
-      map.Fail(keys[k], "must have as many entries as x_mm");
-    }
-  }
-  for (std::size_t i = 0; i < axes[0].size(); ++i) {
-    points->push_back(Eigen::Vector3d(axes[0][i], axes[1][i], axes[2][i]).cast<float>());
-  }
-}
-
 void ReadPatch(StrictMap map, ImportSettings* import) {
   import->patch = true;
   if (map.Has("at_mm")) import->patch_at_m = map.Vector3Si("at_mm", Range::Between(-5000, 5000));
@@ -130,7 +116,7 @@ void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Fol
   ReadSi(&map, "min_edge_mm", Range::Between(0, 5), &import->min_edge_m);
   ReadInteger(&map, "organ_triangles_max", 500, 200000, &import->organ_triangles_max);
   map.KeepNearer("centreline", "patch");
-  if (auto line = map.OptionalMap("centreline")) ReadCentreline(*line, &import->centreline_m);
+  if (auto line = map.OptionalMap("centreline")) import->centreline_m = ReadLine(&*line);
   if (auto patch = map.OptionalMap("patch")) {
     if (!import->centreline_m.empty()) {
       map.Fail("patch",

@@ -11,7 +11,7 @@ namespace {
 using config::Range;
 using config::StrictMap;
 
-constexpr std::size_t kMostShapePoints = 64;
+constexpr std::size_t kMostLinePoints = 64;
 constexpr std::size_t kMostAttachments = 400;
 
 enum class Ends { kNone, kFirst, kLast, kBoth };
@@ -19,21 +19,15 @@ const StrictMap::Choices<Ends> kEnds = {
     {"none", Ends::kNone}, {"first", Ends::kFirst}, {"last", Ends::kLast}, {"both", Ends::kBoth}};
 
 void ReadSwept(StrictMap* map, ShapeSettings* shape) {
-  std::array<std::vector<double>, 3> axes;
-  const std::array keys = {"x_mm", "y_mm", "z_mm"};
-  for (std::size_t k = 0; k < 3; ++k) {
-    axes[k] = map->NumbersSi(keys[k], 2, kMostShapePoints, Range::Between(-5000, 5000));
-    if (axes[k].size() != axes[0].size()) map->Fail(keys[k], "must have as many entries as x_mm");
-  }
-  for (std::size_t i = 0; i < axes[0].size(); ++i) {
-    shape->line_m.push_back(Eigen::Vector3d(axes[0][i], axes[1][i], axes[2][i]).cast<float>());
-    if (i > 0 && !((shape->line_m[i] - shape->line_m[i - 1]).norm() > 1e-4f)) {
+  shape->line_m = ReadLine(map);
+  for (std::size_t i = 1; i < shape->line_m.size(); ++i) {
+    if (!((shape->line_m[i] - shape->line_m[i - 1]).norm() > 1e-4f)) {
       map->Fail("x_mm", "two points that follow each other are less than 0.1 mm apart");
     }
   }
-  shape->radius_m = map->NumbersSi("radius_mm", 1, kMostShapePoints, Range::Between(0.3, 200));
-  if (shape->radius_m.size() == 1) shape->radius_m.resize(axes[0].size(), shape->radius_m[0]);
-  if (shape->radius_m.size() != axes[0].size()) map->Fail("radius_mm", "must have one entry, or as many as x_mm");
+  shape->radius_m = map->NumbersSi("radius_mm", 1, kMostLinePoints, Range::Between(0.3, 200));
+  if (shape->radius_m.size() == 1) shape->radius_m.resize(shape->line_m.size(), shape->radius_m[0]);
+  if (shape->radius_m.size() != shape->line_m.size()) map->Fail("radius_mm", "must have one entry, or as many as x_mm");
 }
 
 Material ReadMaterial(StrictMap* map) {
@@ -90,6 +84,20 @@ const StrictMap::Choices<SolidLook> kSolidLookNames = {
     {"fat", SolidLook::kFat},       {"muscle", SolidLook::kMuscle},
     {"artery", SolidLook::kArtery}, {"vein", SolidLook::kVein},
     {"ureter", SolidLook::kUreter}, {"nerve", SolidLook::kNerve}};
+
+std::vector<Vec3f> ReadLine(StrictMap* map) {
+  std::array<std::vector<double>, 3> axes;
+  const std::array keys = {"x_mm", "y_mm", "z_mm"};
+  for (std::size_t k = 0; k < 3; ++k) {
+    axes[k] = map->NumbersSi(keys[k], 2, kMostLinePoints, Range::Between(-5000, 5000));
+    if (axes[k].size() != axes[0].size()) map->Fail(keys[k], "must have as many entries as x_mm");
+  }
+  std::vector<Vec3f> points;
+  for (std::size_t i = 0; i < axes[0].size(); ++i) {
+    points.push_back(Eigen::Vector3d(axes[0][i], axes[1][i], axes[2][i]).cast<float>());
+  }
+  return points;
+}
 
 ShapeSettings ReadShape(StrictMap map) {
   ShapeSettings shape;

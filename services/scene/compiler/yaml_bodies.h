@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "services/base/config/strict_yaml.h"
 #include "services/scene/builder/scene_settings.h"
@@ -12,6 +13,9 @@ namespace fulcrum::scene {
 
 /// Choices of the key `look`.
 extern const config::StrictMap::Choices<SolidLook> kSolidLookNames;
+
+/// Points of a line from `x_mm`, `y_mm` and `z_mm`, at least two and at most 64 [m].
+std::vector<Vec3f> ReadLine(config::StrictMap* map);
 
 /// `ellipsoid_mm`, or `x_mm`, `y_mm`, `z_mm` and `radius_mm`. Throws InputError, as all functions here.
 ShapeSettings ReadShape(config::StrictMap map);
