@@ -368,15 +368,13 @@ void AddStructures(const SceneSettings& settings, const Sheet& sheet, SceneData*
     ProtectedStructure structure{s.kind, static_cast<float>(s.radius_m), static_cast<float>(s.depth_m),
                                  static_cast<Index>(scene->protected_points.size()), kStructurePoints};
     for (int i = 0; i < kStructurePoints; ++i) {
-      // Catmull-Rom through the given points, so that the course is smooth.
       const double x = static_cast<double>(i) / (kStructurePoints - 1) * static_cast<double>(s.path.size() - 1);
       const auto k = std::min(static_cast<std::size_t>(x), s.path.size() - 2);
       const auto f = static_cast<float>(x - static_cast<double>(k));
       const Vec2f &p1 = s.path[k], &p2 = s.path[k + 1];
       const Vec2f p0 = k > 0 ? s.path[k - 1] : Vec2f(2 * p1 - p2);
       const Vec2f p3 = k + 2 < s.path.size() ? s.path[k + 2] : Vec2f(2 * p2 - p1);
-      const Vec2f q = 0.5f * (2 * p1 + f * (p2 - p0) + f * f * (2 * p0 - 5 * p1 + 4 * p2 - p3) +
-                              f * f * f * (3 * p1 - p0 - 3 * p2 + p3));
+      const Vec2f q = CatmullRom(p0, p1, p2, p3, f);
       const SheetPoint at = sheet.At(q.x(), q.y());
       scene->protected_points.push_back({(at.p - s.depth_m * at.normal).cast<float>(), at.material});
     }

@@ -11,6 +11,15 @@ namespace fulcrum::scene {
 /// Positive when (b-a)x(c-a).(d-a) > 0 [m^3].
 double SignedVolume(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d);
 
+/// Point of the smooth curve through p1 and p2 at fraction f between them; p0 and p3 are the points before and after
+/// (Catmull and Rom 1974).
+template <class Point>
+Point CatmullRom(const Point& p0, const Point& p1, const Point& p2, const Point& p3, typename Point::Scalar f) {
+  constexpr auto kHalf = static_cast<typename Point::Scalar>(0.5);
+  return kHalf *
+         (2 * p1 + f * (p2 - p0) + f * f * (2 * p0 - 5 * p1 + 4 * p2 - p3) + f * f * f * (3 * p1 - p0 - 3 * p2 + p3));
+}
+
 /// The six angles between a tetrahedron's faces; 70.5 degrees each in a regular one.
 struct DihedralRange {
   double least_deg, largest_deg;

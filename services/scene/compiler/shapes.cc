@@ -22,11 +22,6 @@ struct Station {
   double radius;
 };
 
-Vec3d CatmullRom(const Vec3d& p0, const Vec3d& p1, const Vec3d& p2, const Vec3d& p3, double f) {
-  return 0.5 *
-         (2 * p1 + f * (p2 - p0) + f * f * (2 * p0 - 5 * p1 + 4 * p2 - p3) + f * f * f * (3 * p1 - p0 - 3 * p2 + p3));
-}
-
 /// Stations about `spacing` apart, evenly spread over the curve.
 std::vector<Station> StationsOf(const ShapeSettings& shape, double spacing) {
   constexpr int kFine = 32;  // Per stretch between given points.
