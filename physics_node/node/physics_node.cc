@@ -295,7 +295,8 @@ void PhysicsNode::FillFrame(const Tick& tick, TissueFrame::View view) const {
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
     header.grasping_tools |= simulation_.grasp(i).holding() ? 1u << i : 0u;
   }
-  simulation_.particles().CopyPositions(view.xyz.first(3 * std::size_t{header.vertex_count}));
+  view.xyz.resize(3 * std::size_t{header.vertex_count});
+  simulation_.particles().CopyPositions(view.xyz);
 }
 
 void PhysicsNode::PublishManifest(const Tick& tick) {

@@ -86,9 +86,10 @@ void RecorderProbe::SendFor(double seconds) {
         view.header.stamp = stamp;
         view.header.scene_hash = manifest_.scene_hash;
         view.header.vertex_count = kVertices;
-        for (std::size_t k = 0; k < std::size_t{3} * kVertices; ++k) {
+        view.xyz.resize(std::size_t{3} * kVertices);
+        for (float& x : view.xyz) {
           noise = noise * 1664525u + 1013904223u;
-          view.xyz[k] = 1e-6f * static_cast<float>(noise >> 16u);
+          x = 5e-6f * static_cast<float>(noise >> 16u);
         }
       });
       if (sent) sent_frames_.push_back({stamp.sequence, now});

@@ -13,10 +13,10 @@
 namespace fulcrum::replay {
 namespace {
 
-/// Difference in one topic; `bytes` is the recorded message of that channel.
+/// Difference in one topic; `bytes` is the recorded message.
 template <class T>
-std::optional<std::string> Compare(const recording::McapChannel& channel, std::span<const std::uint8_t> bytes,
-                                   std::uint64_t epoch, std::int64_t stamp_ns, const std::vector<Published>& now) {
+std::optional<std::string> Compare(std::span<const std::uint8_t> bytes, std::uint64_t epoch, std::int64_t stamp_ns,
+                                   const std::vector<Published>& now) {
   T recorded;
   if (!bus::DecodeCdr(bytes, &recorded)) return std::nullopt;
   const Stamp& stamp = bus::StampOf(recorded);
@@ -33,11 +33,6 @@ std::optional<std::string> Compare(const recording::McapChannel& channel, std::s
   const std::string label(bus::TopicLabel(bus::kTopicOf<T>));
   if (found == now.end()) return label + " is recorded, but the replay does not publish it";
   if (!bus::DecodeCdr(found->bytes, &replayed)) return std::nullopt;
-  if constexpr (std::is_same_v<T, TissueFrame>) {
-    // Recorded positions may be rounded.
-    const auto coding = recording::FindPointCoding(channel.metadata);
-    for (float& value : replayed.xyz) value = coding ? recording::RoundedTo(coding->step, value) : value;
-  }
   // Sequence numbers begin with the first reader, which a replay has from the start.
   const auto difference = FirstDifference(recorded, replayed, "stamp");
   if (!difference) return std::nullopt;
@@ -55,9 +50,8 @@ std::string DescribeDifference(const std::filesystem::path& recording, std::uint
     const bus::TopicRole* role = bus::RoleNamed(channel.topic);
     // Topics without a single owner, such as Health, describe the process and are no result.
     if (role == nullptr || !role->one_owner()) continue;
-    const auto found = bus::WithMessageOf(role->id, [&]<class T>(std::type_identity<T>) {
-      return Compare<T>(channel, message.data, epoch, stamp_ns, now);
-    });
+    const auto found = bus::WithMessageOf(
+        role->id, [&]<class T>(std::type_identity<T>) { return Compare<T>(message.data, epoch, stamp_ns, now); });
     if (found) return *found;
   }
   return "no published message of this tick differs, so the difference is in the internal state";

@@ -86,7 +86,6 @@ class ReplayedPhysics final : public ReplayedNode {
     std::vector<Published> published;
     // A frame has no reader in a replay, so it is made on request only.
     TissueFrame frame;
-    frame.xyz.resize(3 * scene_.rest_position.size());
     node_->FillFrame(tick_, {frame.header, frame.xyz});
     frame.header.stamp.epoch = epoch();
     frame.header.stamp.stamp_ns = tick_.stamp_ns;

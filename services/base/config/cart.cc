@@ -153,8 +153,6 @@ CartConfig ReadCart(StrictYaml* file, CartConfig cart) {
   cart.verdict.restarts = static_cast<int>(verdict.Integer("restarts", cart.verdict.restarts, 0, kMostRestarts));
   StrictMap recorder = root.MapOrDefaults("recorder");
   cart.recorder.keep_free_MB = recorder.Number("keep_free_MB", cart.recorder.keep_free_MB, Range::Between(0, 1e6));
-  cart.recorder.tissue_step_um =
-      recorder.Number("tissue_step_um", cart.recorder.tissue_step_um, Range::Between(0, 100));
   ReadInputs(root.MapOrDefaults("inputs"), &cart.inputs);
   file->Finish();
   return cart;

@@ -139,12 +139,9 @@ struct VerdictConfig {
   int restarts = 3;  ///< Deaths of one node after which it was started again.
 };
 
-/// What a recording may take of its disk, and how exact its frames are.
+/// What a recording may take of its disk.
 struct RecorderConfig {
   double keep_free_MB = 500;  ///< Free space that a recording leaves: it ends in order before [10^6 B].
-  /// Recorded positions of the tissue are multiples of it [um]; 0: exact, in five times the space. A replay computes
-  /// positions again and does not read them; pictures and maps do.
-  double tissue_step_um = 2;
 };
 
 struct CartConfig;

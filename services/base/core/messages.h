@@ -17,12 +17,12 @@
 
 namespace fulcrum {
 
-inline constexpr int kMaxTools = 4;               ///< Devices, handles and tools on one cart.
-inline constexpr int kMaxContacts = 4;            ///< Contacts per tool in a ContactModel.
-inline constexpr int kMaxTissueVertices = 25600;  ///< Capacity of a TissueFrame: 25600 * 12 B = 300 KiB.
-inline constexpr int kMaxMembraneNodes = 24576;   ///< Capacity of a TopologyState.
-inline constexpr int kPatchTexels = 256;          ///< Edge of a TemperaturePatch.
-inline constexpr int kAtlasTexels = 4096;         ///< Edge of the atlas.
+inline constexpr int kMaxTools = 4;                 ///< Devices, handles and tools on one cart.
+inline constexpr int kMaxContacts = 4;              ///< Contacts per tool in a ContactModel.
+inline constexpr int kMaxTissueVertices = 250'000;  ///< Of a TissueFrame.
+inline constexpr int kMaxMembraneNodes = 250'000;   ///< Of a TopologyState.
+inline constexpr int kPatchTexels = 256;            ///< Edge of a TemperaturePatch.
+inline constexpr int kAtlasTexels = 4096;           ///< Edge of the atlas.
 
 /// A place for each tool, at the origin.
 inline std::array<Vec3f, kMaxTools> AtOrigin() {
@@ -136,13 +136,14 @@ struct TissueFrameHeader {
   std::uint32_t grasping_tools = 0;
 };
 
-/// Positions of all simulated particles in scene order [m], x y z interleaved.
+/// Positions of all simulated particles in scene order [m], x y z interleaved. A reader gets them rounded to multiples
+/// of kTissueStep_m (tissue_blocks.h).
 struct TissueFrame {
   TissueFrameHeader header;
   std::vector<float> xyz;
   struct View {
     TissueFrameHeader& header;
-    std::span<float> xyz;  ///< Capacity 3 * kMaxTissueVertices; write the first 3 * vertex_count.
+    std::vector<float>& xyz;  ///< To be resized to 3 * vertex_count.
   };
 };
 

@@ -77,8 +77,12 @@ struct NodeApp::Impl {
   };
   Joined& Join() {
     if (!joined) {
-      joined.emplace(bus::DdsSettings{
-          .domain = options.domain, .node_name = NodeName(node), .security = SecurityOf(cart, memory, NodeName(node))});
+      joined.emplace(bus::DdsSettings{.domain = options.domain,
+                                      .node_name = NodeName(node),
+                                      .security = SecurityOf(cart, memory, NodeName(node)),
+                                      .tissue_vertices = options.scene.empty()
+                                                             ? kMaxTissueVertices
+                                                             : static_cast<int>(scene.view().rest_position.size())});
     }
     return *joined;
   }

@@ -8,16 +8,15 @@ namespace {
 
 /// For readers other than this project's; the meaning of the fields is in recording/point_coding.h.
 constexpr const char* kRecordedTissueFrame = R"(
-// A TissueFrame in a recording: its array as residuals of words.
+// A TissueFrame in a recording: the coordinates of its blocks as residuals.
 module fulcrum {
 module idl {
 
 struct RecordedTissueFrame {
   TissueFrameHeader header;
-  float step_m;                    // m, a word counts these; 0: words are the ordered bits of floats
   unsigned long kind;              // 0 key, 1 difference from the frame before, 2 relative to the neighbour's, 3 as sent
-  unsigned long value_count;       // up to the last value that is not 0; the rest of 3 * vertex_count is 0
-  sequence<octet> residuals;       // zigzag; low bytes of all values, then their second bytes, ...
+  unsigned long block_count;       // blocks of 64 vertices; those after the last vertex repeat it
+  sequence<octet> residuals;       // of 5 um; zigzag; low bytes of all coordinates, then their second bytes, ...
 };
 
 };
@@ -37,8 +36,6 @@ RecordedType RecordedTypeOf(TopicId topic) {
   return {"RecordedTissueFrame", bus::SchemaText(type) + kRecordedTissueFrame};
 }
 
-recording::PointCoding TissueCoding(float step_m) {
-  return {.head_B = kEncapsulation_B + kTissueHeader_B, .values = std::size_t{3} * kMaxTissueVertices, .step = step_m};
-}
+recording::PointCoding TissueCoding() { return {.head_B = kEncapsulation_B + kTissueHeader_B}; }
 
 }  // namespace fulcrum::recorder

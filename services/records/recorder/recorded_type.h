@@ -14,7 +14,6 @@ struct RecordedType {
 };
 [[nodiscard]] RecordedType RecordedTypeOf(TopicId topic);
 
-/// @param step_m 0: positions are exact [m].
-[[nodiscard]] recording::PointCoding TissueCoding(float step_m);
+[[nodiscard]] recording::PointCoding TissueCoding();
 
 }  // namespace fulcrum::recorder

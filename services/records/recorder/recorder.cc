@@ -121,7 +121,7 @@ void Recorder::AddNewChannels() {
     if (settings_.describe) channel.about = settings_.describe(channel.writer);
     channel.about["writer"] = Hex(channel.writer);
     if (channel.topic != TopicId::kTissueFrame) continue;
-    const recording::PointCoding coding = TissueCoding(settings_.tissue_step_m);
+    const recording::PointCoding coding = TissueCoding();
     recording::PutPointCoding(coding, &channel.about);
     packer_.Code(static_cast<std::uint16_t>(i), coding);
   }

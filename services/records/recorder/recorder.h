@@ -34,9 +34,6 @@ struct RecorderSettings {
   std::size_t keep_B = std::size_t{1} << 30;  ///< Upper limit of that memory.
   /// Space that a recording leaves free on its disk [B]: it ends in order before.
   std::uint64_t keep_free_B = 500'000'000;
-  /// Positions of a TissueFrame are rounded to multiples of it [m]; 0: they are exact. A replay computes them again, so
-  /// they are for pictures and maps only.
-  float tissue_step_m = 2e-6F;
   std::string library;  ///< Name of the writing program: "fulcrum 0.1.0".
   /// Metadata of the session in the file, one record per entry.
   std::map<std::string, recording::TextMap> metadata;

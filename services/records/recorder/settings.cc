@@ -50,7 +50,6 @@ RecorderSettings TakeSettings(app::NodeApp* app) {
     throw InputError("nothing to do: give --file FILE, --keep SECONDS or both");
   }
   settings.keep_free_B = static_cast<std::uint64_t>(1e6 * app->cart().recorder.keep_free_MB);
-  settings.tissue_step_m = static_cast<float>(1e-6 * app->cart().recorder.tissue_step_um);
   settings.library = std::string("fulcrum ") + app::kVersion;
   settings.metadata = MetadataOf(app);
   return settings;

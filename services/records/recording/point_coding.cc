@@ -4,10 +4,11 @@
 #include <array>
 #include <bit>
 #include <charconv>
-#include <cmath>
 #include <cstring>
+#include <tuple>
 
 #include "services/base/core/byte_stream.h"
+#include "services/base/core/tissue_blocks.h"
 #include "services/base/core/zigzag.h"
 
 namespace fulcrum::recording {
@@ -15,32 +16,13 @@ namespace {
 
 enum Kind : std::uint32_t { kKey, kDifference, kNeighbour, kAsSent };
 
-constexpr const char* kHeadKey = "points_head_B";
-constexpr const char* kValuesKey = "points_values";
-constexpr const char* kStepKey = "points_step";
+constexpr const char* kHeadKey = "blocks_head_B";
 
-constexpr std::size_t kPoint = 3;  ///< Values of a point.
-constexpr std::uint32_t kSign = 0x80000000u;
-/// Largest number of steps: differences of differences stay within 32 bits.
-constexpr float kMostSteps = 1 << 28;
+constexpr std::size_t kPoint = 3;  ///< Words of a point.
+constexpr std::size_t kBlockWords = std::tuple_size_v<BlockSteps>;
 
 /// Of a difference modulo 2^32.
 std::uint32_t ZigzagOf(std::uint32_t difference) { return Zigzag(static_cast<std::int32_t>(difference)); }
-
-/// Bits of a float such that neighbouring values have neighbouring numbers, and back.
-std::uint32_t Ordered(std::uint32_t bits) { return (bits & kSign) != 0 ? kSign - (bits & ~kSign) - 1 : bits | kSign; }
-std::uint32_t Bits(std::uint32_t ordered) {
-  return (ordered & kSign) != 0 ? ordered & ~kSign : (kSign - 1 - ordered) | kSign;
-}
-
-/// The largest value that is rounded to steps.
-float LargestOf(float step) { return kMostSteps * step; }
-/// The nearest whole number: the low bits of a sum so large that nothing behind the point remains.
-std::int32_t Whole(double steps) {
-  constexpr double kLarge = 0x1.8p52;
-  return static_cast<std::int32_t>(std::bit_cast<std::uint64_t>(steps + kLarge));
-}
-float ValueOf(std::int32_t steps, double step) { return static_cast<float>(step * static_cast<double>(steps)); }
 
 template <class T>
 bool Parse(const std::map<std::string, std::string>& metadata, const char* key, T* value) {
@@ -54,50 +36,35 @@ bool Parse(const std::map<std::string, std::string>& metadata, const char* key, 
 }  // namespace
 
 void PutPointCoding(const PointCoding& coding, std::map<std::string, std::string>* metadata) {
-  std::array<char, 32> step{};
-  const auto written = std::to_chars(step.data(), step.data() + step.size(), coding.step);
   (*metadata)[kHeadKey] = std::to_string(coding.head_B);
-  (*metadata)[kValuesKey] = std::to_string(coding.values);
-  (*metadata)[kStepKey] = std::string(step.data(), written.ptr);
 }
 
 std::optional<PointCoding> FindPointCoding(const std::map<std::string, std::string>& metadata) {
   PointCoding coding;
-  if (!Parse(metadata, kHeadKey, &coding.head_B) || !Parse(metadata, kValuesKey, &coding.values) ||
-      !Parse(metadata, kStepKey, &coding.step)) {
-    return std::nullopt;
-  }
-  const bool good = coding.head_B <= PointCoding::kMostHead_B && coding.values <= PointCoding::kMostValues &&
-                    coding.step >= 0 && coding.step <= PointCoding::kMostStep;
+  const bool good = Parse(metadata, kHeadKey, &coding.head_B) && coding.head_B <= PointCoding::kMostHead_B;
   return good ? std::optional(coding) : std::nullopt;
 }
 
-float RoundedTo(float step, float value) {
-  if (!(step > 0 && std::abs(value) <= LargestOf(step))) return value;
-  return ValueOf(Whole(1 / static_cast<double>(step) * static_cast<double>(value)), static_cast<double>(step));
-}
-
-float PointCoder::TakeWords(std::span<const std::uint8_t> array) {
-  const auto bits_of = [&array](std::size_t i) {
-    std::uint32_t bits = 0;
-    std::memcpy(&bits, array.data() + sizeof bits * i, sizeof bits);
-    return bits;
-  };
-  std::size_t count = coding_.values;
-  while (count > 0 && bits_of(count - 1) == 0) --count;
-  words_.resize(count);
-  // Compared as bits, which are larger for a NaN than for any number.
-  std::uint32_t largest = 0;
-  for (std::size_t i = 0; i < count; ++i) largest = std::max(largest, bits_of(i) & ~kSign);
-  if (coding_.step > 0 && largest <= std::bit_cast<std::uint32_t>(LargestOf(coding_.step))) {
-    const double per_step = 1 / static_cast<double>(coding_.step);
-    for (std::size_t i = 0; i < count; ++i) {
-      words_[i] = static_cast<std::uint32_t>(Whole(per_step * static_cast<double>(std::bit_cast<float>(bits_of(i)))));
-    }
-    return coding_.step;
+bool PointCoder::TakeWords(std::span<const std::uint8_t> message) {
+  std::uint32_t blocks = 0;
+  if (message.size() < coding_.head_B + sizeof blocks) return false;
+  const std::uint8_t* from = message.data() + coding_.head_B;
+  std::memcpy(&blocks, from, sizeof blocks);
+  if (blocks > PointCoding::kMostBlocks ||
+      message.size() != coding_.head_B + sizeof blocks + blocks * sizeof(TissueBlock)) {
+    return false;
   }
-  for (std::size_t i = 0; i < count; ++i) words_[i] = Ordered(bits_of(i));
-  return 0;
+  words_.resize(blocks * kBlockWords);
+  from += sizeof blocks;
+  TissueBlock block;
+  BlockSteps steps;
+  for (std::size_t b = 0; b < blocks; ++b) {
+    std::memcpy(&block, from + b * sizeof block, sizeof block);
+    if (!IsCanonical(block)) return false;
+    Unpack(block, &steps);
+    std::memcpy(words_.data() + b * kBlockWords, steps.data(), sizeof steps);
+  }
+  return true;
 }
 
 std::uint32_t PointCoder::Choose() const {
@@ -134,26 +101,23 @@ std::uint32_t PointCoder::Predict(std::uint32_t kind) {
 
 void PointCoder::Encode(std::span<const std::uint8_t> message, std::vector<std::uint8_t>* coded) {
   ByteWriter to(coded);
-  const auto put_head = [&](float step, std::uint32_t kind, std::size_t count, std::size_t B) {
+  const auto put_head = [&](std::uint32_t kind, std::size_t blocks, std::size_t B) {
     const std::size_t head_B = std::min(coding_.head_B, message.size());
     to.Bytes(message.data(), head_B);
     coded->resize(coded->size() + coding_.head_B - head_B);
-    to.Bytes(&step, sizeof step);
     to.Number(kind);
-    to.Number(static_cast<std::uint32_t>(count));
+    to.Number(static_cast<std::uint32_t>(blocks));
     to.Number(static_cast<std::uint32_t>(B));
   };
-  if (message.size() != coding_.message_B()) {
-    put_head(0, kAsSent, 0, message.size());
+  if (!TakeWords(message)) {
+    put_head(kAsSent, 0, message.size());
     to.Bytes(message.data(), message.size());
     return;
   }
-  const float step = TakeWords(message.subspan(coding_.head_B));
-  if (step != last_step_) Restart();
   const std::uint32_t kind = Choose();
   const auto planes = static_cast<std::size_t>((std::bit_width(Predict(kind)) + 7) / 8);
   const std::size_t count = words_.size();
-  put_head(step, kind, count, planes * count);
+  put_head(kind, count / kBlockWords, planes * count);
   const std::size_t at = coded->size();
   coded->resize(at + planes * count);
   for (std::size_t plane = 0; plane < planes; ++plane) {
@@ -161,26 +125,25 @@ void PointCoder::Encode(std::span<const std::uint8_t> message, std::vector<std::
     for (std::size_t i = 0; i < count; ++i) bytes[i] = static_cast<std::uint8_t>(residuals_[i] >> (8 * plane));
   }
   last_.swap(words_);
-  last_step_ = step;
 }
 
 bool PointCoder::Decode(std::span<const std::uint8_t> coded, std::vector<std::uint8_t>* message) {
   ByteReader from(coded);
   const std::span<const std::uint8_t> head = from.Take(coding_.head_B);
-  const auto step = std::bit_cast<float>(from.Number<std::uint32_t>());
   const auto kind = from.Number<std::uint32_t>();
-  const std::size_t count = from.Number<std::uint32_t>();
+  const std::size_t blocks = from.Number<std::uint32_t>();
   const std::span<const std::uint8_t> bytes = from.Take(from.Number<std::uint32_t>());
   if (from.good() && kind == kAsSent) {
     message->assign(bytes.begin(), bytes.end());
     return true;
   }
+  const bool fits = blocks <= PointCoding::kMostBlocks;
+  const std::size_t count = fits ? blocks * kBlockWords : 0;
   const std::size_t planes = count == 0 ? 0 : bytes.size() / count;
   const bool refers = kind != kKey;
-  const bool is_complete = from.good() && kind < kAsSent && count <= coding_.values &&
-                           planes <= sizeof(std::uint32_t) && planes * count == bytes.size();
-  const bool has_base = !refers || (!last_.empty() && last_.size() == count && last_step_ == step);
-  if (!is_complete || !has_base || !(step == 0 || step == coding_.step)) {
+  const bool is_complete =
+      from.good() && fits && kind < kAsSent && planes <= sizeof(std::uint32_t) && planes * count == bytes.size();
+  if (!is_complete || (refers && (last_.empty() || last_.size() != count))) {
     Restart();  // So that nothing after it is decoded from the message before it.
     return false;
   }
@@ -197,16 +160,22 @@ bool PointCoder::Decode(std::span<const std::uint8_t> coded, std::vector<std::ui
     const std::uint32_t moved = kind == kDifference || i < kPoint ? 0 : words_[i - kPoint] - last_[i - kPoint];
     words_[i] = last_[i] + moved + static_cast<std::uint32_t>(Unzigzag(residuals_[i]));
   }
-  message->assign(coding_.message_B(), 0);
-  std::copy(head.begin(), head.end(), message->begin());
-  for (std::size_t i = 0; i < count; ++i) {
-    const float value = step > 0 ? ValueOf(static_cast<std::int32_t>(words_[i]), static_cast<double>(step))
-                                 : std::bit_cast<float>(Bits(words_[i]));
-    std::memcpy(message->data() + coding_.head_B + sizeof value * i, &value, sizeof value);
-  }
+  PutBlocks(head, message);
   last_.swap(words_);
-  last_step_ = step;
   return true;
+}
+
+void PointCoder::PutBlocks(std::span<const std::uint8_t> head, std::vector<std::uint8_t>* message) const {
+  const auto blocks = static_cast<std::uint32_t>(words_.size() / kBlockWords);
+  message->assign(head.begin(), head.end());
+  ByteWriter to(message);
+  to.Number(blocks);
+  BlockSteps steps;
+  for (std::size_t b = 0; b < blocks; ++b) {
+    std::memcpy(steps.data(), words_.data() + b * kBlockWords, sizeof steps);
+    const TissueBlock block = Pack(steps);
+    to.Bytes(&block, sizeof block);
+  }
 }
 
 void PointCoders::BeginChunk() {

@@ -1,27 +1,25 @@
-// Coding of messages that hold an array of points, such as a TissueFrame: each message as its difference from the one
-// before it in the same chunk.
+// Coding of messages that hold an array of points in blocks (services/base/core/tissue_blocks.h), such as a
+// TissueFrame: each message as its difference from the one before it in the same chunk.
 //
 // A coded message:
 //
 //   head_B bytes   those of the message, unchanged
-//   float          step: a value is a multiple of it; 0: values are exact
 //   uint32         kind: 0 key, 1 difference, 2 difference relative to the neighbour, 3 as sent
-//   uint32         number of values: up to the last one that is not +0; those after it are 0
+//   uint32         number of blocks
 //   uint32         length of what follows [B]
 //   bytes          residuals: the low byte of each, then the second byte of each, … as many as the largest needs
 //
-// A word is value / step, rounded; a reader gets the value as float(double(step) * int32(word)). With step 0 it is made
-// of the bits of the float: 0x7fffffff - (bits & 0x7fffffff) if it is negative, bits | 0x80000000 otherwise.
-//
-// A residual is a difference modulo 2^32, as zigzag: 0, -1, 1, -2, … become 0, 1, 2, 3, … w are the words of this
-// message, p those of the last message that was not kept as sent. i-3 is the same coordinate of the point before; for
-// the first point w[i-3] and p[i-3] are 0.
+// A word is a coordinate in steps, 192 a block; the blocks of the message are packed from them. A residual is a
+// difference modulo 2^32, as zigzag: 0, -1, 1, -2, … become 0, 1, 2, 3, … w are the words of this message, p those of
+// the last message that was not kept as sent. i-3 is the same coordinate of the point before; for the first point
+// w[i-3] and p[i-3] are 0.
 //
 //   key            w[i] - w[i-3]
 //   difference     w[i] - p[i]
 //   neighbour      (w[i] - p[i]) - (w[i-3] - p[i-3])
 //
-// As sent: the bytes are the whole message, which has another length than the coding expects.
+// As sent: the bytes are the whole message, which is not the head, the number of blocks (uint32) and so many canonical
+// blocks.
 #pragma once
 
 #include <cstddef>
@@ -36,24 +34,17 @@ namespace fulcrum::recording {
 
 /// How a channel's messages are coded. It is kept in the metadata of the channel.
 struct PointCoding {
-  std::size_t head_B = 0;  ///< Length of what precedes the array, with the encapsulation of CDR.
-  std::size_t values = 0;  ///< Length of the array of float; the message ends with it.
-  float step = 0;          ///< Values are rounded to multiples of it; 0: they are exact.
+  std::size_t head_B = 0;  ///< Length of what precedes the number of blocks, with the encapsulation of CDR.
 
-  [[nodiscard]] std::size_t message_B() const { return head_B + sizeof(float) * values; }
   [[nodiscard]] bool operator==(const PointCoding&) const = default;
 
   static constexpr std::size_t kMostHead_B = 4096;
-  static constexpr float kMostStep = 1;
-  static constexpr std::size_t kMostValues = std::size_t{1} << 18;
+  static constexpr std::size_t kMostBlocks = std::size_t{1} << 14;
 };
 
 void PutPointCoding(const PointCoding& coding, std::map<std::string, std::string>* metadata);
 /// The coding of a channel with this metadata; nothing if it has none, or one that is out of range.
 [[nodiscard]] std::optional<PointCoding> FindPointCoding(const std::map<std::string, std::string>& metadata);
-
-/// What the value becomes in a recording with this step. A rounded value stays the same when it is rounded again.
-[[nodiscard]] float RoundedTo(float step, float value);
 
 /// Codes or decodes the messages of one channel, in their order. Allocates nothing once the buffers have grown.
 class PointCoder {
@@ -62,15 +53,16 @@ class PointCoder {
 
   /// The next message begins a chunk: it does not refer to the one before it.
   void Restart() { last_.clear(); }
-  /// Appends a message in coded form. Any bytes are accepted: what is not a message of this coding is kept as sent, and
-  /// a message with values that are not finite, or too large for the step, is kept exactly.
+  /// Appends a message in coded form. Any bytes are accepted: what is not a message of this coding is kept as sent.
   void Encode(std::span<const std::uint8_t> message, std::vector<std::uint8_t>* coded);
   /// The reverse. False if the bytes are no coded message, or refer to a message before that was not decoded.
   [[nodiscard]] bool Decode(std::span<const std::uint8_t> coded, std::vector<std::uint8_t>* message);
 
  private:
-  /// Fills `words_` from the array; returns the step that applies.
-  float TakeWords(std::span<const std::uint8_t> array);
+  /// Fills `words_` from the message. False if it is not of this coding.
+  [[nodiscard]] bool TakeWords(std::span<const std::uint8_t> message);
+  /// Makes the message of `words_`.
+  void PutBlocks(std::span<const std::uint8_t> head, std::vector<std::uint8_t>* message) const;
   /// The kind of residuals that takes fewer bytes.
   [[nodiscard]] std::uint32_t Choose() const;
   /// Fills `residuals_`; returns the bits that any of them has.
@@ -78,7 +70,6 @@ class PointCoder {
 
   const PointCoding coding_;
   std::vector<std::uint32_t> words_, last_, residuals_;  ///< `last_`: of the message before; empty: none.
-  float last_step_ = 0;
 };
 
 /// The coders of a file's channels, of which only those are kept that the present chunk or the one before needs: each

@@ -115,8 +115,11 @@ class Host {
     crash_watch_.emplace(settings_.domain, memory_, folder_);
     const bus::Security security = app::SecurityOf(cart, bus::kLinkIdentity);
     bus::OpenSharedMemory(settings_.domain, security);
-    local_.emplace(bus::DdsSettings{
-        .domain = settings_.domain, .node_name = "host", .shared_memory = memory_, .security = security});
+    local_.emplace(bus::DdsSettings{.domain = settings_.domain,
+                                    .node_name = "host",
+                                    .shared_memory = memory_,
+                                    .security = security,
+                                    .tissue_vertices = static_cast<int>(scene_->view().rest_position.size())});
     healths_in_ = local_->MakeInput<Health>();
     link_.Join(&*local_, ~offer.nodes);
     desk_.emplace(memory_, guard_, settings_.cart ? settings_.cart->security.group : std::string(),

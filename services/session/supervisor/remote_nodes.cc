@@ -46,10 +46,12 @@ link::Offer OfferOf(const SessionSetup& setup) {
 RemoteNodes::RemoteNodes(const SessionSetup& setup, bus::DdsParticipant* participant) : setup_(setup) {
   link_.emplace(link::LinkSettings{.far = FarOf(setup.settings), .offer = OfferOf(setup), .scene = setup.folder.scene});
   if (const bus::Security security = bus::AnnouncedSecurity(setup.memory, bus::kLinkIdentity); security.on()) {
-    link_bus_ = std::make_unique<bus::DdsParticipant>(bus::DdsSettings{.domain = setup.settings.cart.domain,
-                                                                       .node_name = "link",
-                                                                       .shared_memory = setup.memory,
-                                                                       .security = security});
+    link_bus_ = std::make_unique<bus::DdsParticipant>(
+        bus::DdsSettings{.domain = setup.settings.cart.domain,
+                         .node_name = "link",
+                         .shared_memory = setup.memory,
+                         .security = security,
+                         .tissue_vertices = static_cast<int>(setup.scene.view().rest_position.size())});
     participant = link_bus_.get();
   }
   link_->Join(participant, link_->settings().offer->nodes);

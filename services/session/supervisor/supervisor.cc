@@ -55,7 +55,8 @@ struct Supervisor::Impl {
     participant.emplace(bus::DdsSettings{.domain = up.cart.domain,
                                          .node_name = "supervisor",
                                          .shared_memory = setup.memory,
-                                         .security = setup.security()});
+                                         .security = setup.security(),
+                                         .tissue_vertices = static_cast<int>(setup.scene.view().rest_position.size())});
     manifests = participant->MakeOutput<SceneManifest>();
     generator.emplace(participant->MakeOutput<GeneratorSetting>(), up.cart.generator, setup.operator_script());
     healths = participant->MakeInput<Health>();

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "services/base/core/tissue_blocks.h"
 #include "services/transport/bus/gate.h"
 #include "services/transport/bus/input_account.h"
 #include "services/transport/bus/port.h"
@@ -154,14 +155,13 @@ class HubOutput : public OutputOf<T>::type {
 
 inline TissueFrame::View MakeView(TissueFrame* frame) {
   frame->header = {};
-  frame->xyz.resize(std::size_t{3} * kMaxTissueVertices);
+  frame->xyz.clear();
   return {frame->header, frame->xyz};
 }
-/// Cuts the payload to the counts of the header. False if the counts exceed the payload.
+/// Makes the payload what a reader on the bus would get. False if it is not as the header counts it.
 inline bool Close(TissueFrame* frame) {
-  if (frame->header.vertex_count > kMaxTissueVertices) return false;
-  frame->xyz.resize(std::size_t{3} * frame->header.vertex_count);
-  return true;
+  const std::size_t count = frame->header.vertex_count;
+  return count <= kMaxTissueVertices && frame->xyz.size() == 3 * count && RoundPositions(frame->xyz);
 }
 inline TemperaturePatch::View MakeView(TemperaturePatch* patch) {
   patch->header = {};

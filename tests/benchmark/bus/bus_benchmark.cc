@@ -31,6 +31,7 @@ namespace fulcrum::bus {
 namespace {
 
 constexpr int kDomain = 13;
+constexpr int kFrameVertices = 25'600;
 using Clock = std::chrono::steady_clock;
 std::int64_t NowNs() { return Clock::now().time_since_epoch().count(); }
 double Us(std::int64_t ns) { return 1e-3 * static_cast<double>(ns); }
@@ -178,7 +179,7 @@ void Frames(benchmark::Report* report) {
   // Discovery does not complete on both sides at once; the reader has matched by its next announcement at the latest.
   if (!Eventually([&] { return out->has_readers(); })) return;
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
-  std::vector<float> xyz(std::size_t{3} * kMaxTissueVertices, 0.25f);
+  std::vector<float> xyz(std::size_t{3} * kFrameVertices, 0.25f);
   Stamper stamper(NowNs());
   std::vector<double> write_us;
   auto next = Clock::now();
@@ -189,8 +190,8 @@ void Frames(benchmark::Report* report) {
     const std::int64_t start_ns = NowNs();
     out->WriteInPlace([&](TissueFrame::View view) {
       view.header.stamp = stamper.Next(start_ns);
-      view.header.vertex_count = kMaxTissueVertices;
-      std::copy(xyz.begin(), xyz.end(), view.xyz.begin());
+      view.header.vertex_count = kFrameVertices;
+      view.xyz.assign(xyz.begin(), xyz.end());
     });
     write_us.push_back(Us(NowNs() - start_ns));
   }

@@ -81,8 +81,7 @@ class Recording final : public Target {
   static Seed CodedSeed(const std::filesystem::path& file) {
     constexpr std::size_t kHead_B = 92;  // Encapsulation and TissueFrameHeader.
     std::map<std::string, std::string> metadata{{"node", "physics_node"}};
-    recording::PutPointCoding({.head_B = kHead_B, .values = std::size_t{3} * kMaxTissueVertices, .step = 2e-6F},
-                              &metadata);
+    recording::PutPointCoding({.head_B = kHead_B}, &metadata);
     {
       recording::McapWriter writer(file, "", "fuzz");
       const auto channel =

@@ -122,7 +122,7 @@ TEST(DdsProcesses, KilledSubscriberDoesNotStopTheWriter) {
       frames->WriteInPlace([&](TissueFrame::View view) {
         view.header.stamp = {sequence / 10, 1, 1};
         view.header.vertex_count = kMaxTissueVertices;
-        std::fill(view.xyz.begin(), view.xyz.end(), 0.5f);
+        view.xyz.assign(3 * kMaxTissueVertices, 0.5f);
       });
     }
     longest = std::max(longest, std::chrono::steady_clock::now() - start);

@@ -73,9 +73,24 @@ TYPED_TEST(EveryTopic, BadStampIsStoppedAtTheGate) {
 }
 
 TEST(DdsInput, NaNIsStoppedAndTheNextGoodOnePasses) {
+  Pair<ToolState> bus;
+  ToolState tool = test::Sample<ToolState>(1);
+  tool.tools[0].p_WT.x() = std::numeric_limits<float>::quiet_NaN();
+  ASSERT_TRUE(bus.out->Write(tool));
+  ToolState got;
+  EXPECT_TRUE(Eventually([&] { return !bus.in->TakeNext(&got) && bus.in->stats().rejected == 1; }));
+  ASSERT_TRUE(bus.out->Write(test::Sample<ToolState>(2)));
+  ASSERT_TRUE(Eventually([&] { return bus.in->TakeNext(&got); }));
+  EXPECT_EQ(got.stamp.sequence, 2u);
+}
+
+TEST(DdsInput, APositionOutsideTheRoomIsStoppedAndNaNIsNotSent) {
   Pair<TissueFrame> bus;
   TissueFrame frame = test::Sample<TissueFrame>(1);
   frame.xyz[100] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_FALSE(bus.out->Write(frame));
+  EXPECT_EQ(bus.out->stats().failed, 1u);
+  frame.xyz[100] = 11;
   ASSERT_TRUE(bus.out->Write(frame));
   TissueFrame got;
   EXPECT_TRUE(Eventually([&] { return !bus.in->TakeNext(&got) && bus.in->stats().rejected == 1; }));
@@ -225,13 +240,12 @@ TEST(DdsOutput, SteadyStreamDoesNotAllocateInTheCallersThread) {
 }
 
 TEST(DdsOutput, PayloadIsWrittenInTheSharedMemoryOfTheCart) {
-  Pair<TissueFrame> bus;
+  Pair<TemperaturePatch> bus;
   const std::string directory = SharedMemoryDirectory(kDomain).string();
   bool in_shared_memory = false;
-  ASSERT_TRUE(bus.out->WriteInPlace([&](TissueFrame::View view) {
+  ASSERT_TRUE(bus.out->WriteInPlace([&](TemperaturePatch::View view) {
     view.header.stamp.sequence = 1;
-    view.header.vertex_count = 1;
-    const auto address = reinterpret_cast<std::uintptr_t>(view.xyz.data());
+    const auto address = reinterpret_cast<std::uintptr_t>(view.texels.data());
     std::ifstream maps("/proc/self/maps");
     for (std::string line; std::getline(maps, line);) {
       unsigned long first = 0, last = 0;
@@ -241,9 +255,27 @@ TEST(DdsOutput, PayloadIsWrittenInTheSharedMemoryOfTheCart) {
     }
   }));
   EXPECT_TRUE(in_shared_memory);
-  TissueFrame got;
+  TemperaturePatch got;
   ASSERT_TRUE(Eventually([&] { return bus.in->TakeLatest(&got); }));
-  EXPECT_EQ(got.xyz.size(), 3u);
+}
+
+/// Writer and reader need not know the same largest frame: each frame is as long as its content.
+TEST(DdsOutput, AFrameLargerThanItsWritersMemoryIsNotSent) {
+  DdsParticipant small({.domain = kDomain, .node_name = "small", .shared_memory = {}, .tissue_vertices = 100});
+  DdsParticipant large({.domain = kDomain, .node_name = "large", .shared_memory = {}});
+  const auto out = small.MakeOutput<TissueFrame>();
+  const auto in = large.MakeInput<TissueFrame>();
+  TissueFrame frame = test::Sample<TissueFrame>();
+  EXPECT_FALSE(out->Write(frame));
+  EXPECT_EQ(out->stats().failed, 1u);
+  frame.header.vertex_count = 100;
+  frame.xyz.resize(300);
+  TissueFrame got;
+  ASSERT_TRUE(Eventually([&] {
+    ++frame.header.stamp.sequence;
+    return out->Write(frame) && in->TakeLatest(&got);
+  }));
+  EXPECT_EQ(got.xyz, frame.xyz);
 }
 
 TEST(DdsOutput, FillThatThrowsIsCountedAndItsLoanComesBack) {

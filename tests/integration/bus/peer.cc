@@ -40,7 +40,7 @@ std::int64_t NowNs() { return std::chrono::steady_clock::now().time_since_epoch(
     out->WriteInPlace([&](TissueFrame::View view) {
       view.header.stamp = stamper.Next(NowNs());
       view.header.vertex_count = kMaxTissueVertices;
-      for (float& x : view.xyz) x = static_cast<float>(view.header.stamp.sequence % 8);
+      view.xyz.assign(3 * kMaxTissueVertices, static_cast<float>(view.header.stamp.sequence % 8));
     });
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }

@@ -108,11 +108,12 @@ TEST(GateRanges, ToolState) {
 }
 
 TEST(GateRanges, TissueFrame) {
-  ExpectRefused<TissueFrame>({{"more vertices than fit", [](auto& m) { m.header.vertex_count = 25601; }},
-                              {"payload shorter than its count", [](auto& m) { m.xyz.pop_back(); }},
-                              {"payload longer than its count", [](auto& m) { --m.header.vertex_count; }},
-                              {"a fifth tool grasps", [](auto& m) { m.header.grasping_tools = 16; }},
-                              {"vertex outside the room", [](auto& m) { m.xyz[60000] = -10.5f; }}});
+  ExpectRefused<TissueFrame>(
+      {{"more vertices than fit", [](auto& m) { m.header.vertex_count = kMaxTissueVertices + 1; }},
+       {"payload shorter than its count", [](auto& m) { m.xyz.pop_back(); }},
+       {"payload longer than its count", [](auto& m) { --m.header.vertex_count; }},
+       {"a fifth tool grasps", [](auto& m) { m.header.grasping_tools = 16; }},
+       {"vertex outside the room", [](auto& m) { m.xyz[60000] = -10.5f; }}});
 }
 
 TEST(GateRanges, ContactModel) {

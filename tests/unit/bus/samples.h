@@ -3,6 +3,7 @@
 #pragma once
 
 #include "services/base/core/messages.h"
+#include "services/base/core/tissue_blocks.h"
 
 namespace fulcrum::bus::test {
 
@@ -36,7 +37,7 @@ template <>
 inline TissueFrame Sample(std::uint64_t sequence) {
   TissueFrame m;
   m.header = {{sequence, 13, 3000}, 0xfeedf00d12345678ull, 3, 4, 5, 1.25, 1.5, 20556, 2};
-  for (std::size_t i = 0; i < 3 * 20556; ++i) m.xyz.push_back(1e-6f * static_cast<float>(i));
+  for (int i = 0; i < 3 * 20556; ++i) m.xyz.push_back(PositionOf(i));
   return m;
 }
 
@@ -151,13 +152,13 @@ inline TopologyState Sample(std::uint64_t sequence) {
   m.stamp = {sequence, 16, 6000};
   m.scene_hash = 0xabcdef;
   m.revision = 42;
-  m.rows = 96;
-  m.cols = 256;
+  m.rows = 625;
+  m.cols = 400;
   m.cut_length_m = 0.025f;
   m.cut_width_m = 0.0016f;
   m.cut_off_way_m = 0.0003f;
-  const std::size_t nodes = 96 * 256;
-  static_assert(96 * 256 == kMaxMembraneNodes);
+  const std::size_t nodes = 625 * 400;
+  static_assert(625 * 400 == kMaxMembraneNodes);
   for (std::size_t i = 0; i < nodes / 8; ++i) m.dead_nodes.push_back(static_cast<std::uint8_t>(i * 7));
   for (std::size_t i = 0; i < 3 * nodes / 8; ++i) m.dead_edges.push_back(static_cast<std::uint8_t>(i * 11));
   for (std::size_t i = 0; i < 3 * nodes; ++i) m.shrink.push_back(static_cast<std::uint8_t>(i * 13));
@@ -170,9 +171,9 @@ inline TearState Sample(std::uint64_t sequence) {
   TearState m;
   m.stamp = {sequence, 16, 6500};
   m.scene_hash = 0xabcdef;
-  m.rows = 96;
-  m.cols = 256;
-  for (std::size_t i = 0; i < std::size_t{3} * 96 * 256 / 8; ++i)
+  m.rows = 625;
+  m.cols = 400;
+  for (std::size_t i = 0; i < std::size_t{3} * 625 * 400 / 8; ++i)
     m.torn_edges.push_back(static_cast<std::uint8_t>(i * 5));
   return m;
 }

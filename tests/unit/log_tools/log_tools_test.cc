@@ -266,48 +266,39 @@ TEST_F(LogTools, RecoverMendsWhatAKillHasLeft) {
 }
 
 /// Frames as a recorder writes them, read by the tools.
-TEST_F(LogTools, RecordedPositionsAreRoundedToTheStepOrExact) {
-  for (const float step_m : {2e-6F, 0.0F}) {
-    const fs::path file = folder_ / (step_m > 0 ? "rounded.mcap" : "exact.mcap");
-    std::vector<TissueFrame> sent;
-    {
-      recorder::RecorderSettings settings;
-      settings.file = file;
-      settings.tissue_step_m = step_m;
-      recorder::Recorder recorder(settings);
-      for (std::uint64_t i = 1; i <= 5; ++i) {
-        TissueFrame frame = bus::test::Sample<TissueFrame>(i);
-        for (float& value : frame.xyz) value += 1e-4F * static_cast<float>(i);
-        std::vector<std::uint8_t> bytes;
-        ASSERT_TRUE(bus::EncodeCdr(frame, &bytes));
-        bus::RawSample sample{TopicId::kTissueFrame, {1}, i, 1000, static_cast<std::int64_t>(i) * 1000, {}, {}};
-        constexpr std::size_t kEncapsulation_B = 4;
-        sample.head = std::as_bytes(std::span(bytes)).first(kEncapsulation_B);
-        sample.body = std::as_bytes(std::span(bytes)).subspan(kEncapsulation_B);
-        recorder.Receive(sample, [] { return true; });
-        sent.push_back(std::move(frame));
-      }
+TEST_F(LogTools, RecordedPositionsAreThoseOfTheBus) {
+  const fs::path file = folder_ / "frames.mcap", copy = folder_ / "copy.mcap";
+  std::vector<TissueFrame> sent;
+  {
+    recorder::RecorderSettings settings;
+    settings.file = file;
+    recorder::Recorder recorder(settings);
+    for (std::uint64_t i = 1; i <= 5; ++i) {
+      TissueFrame frame = bus::test::Sample<TissueFrame>(i);
+      for (float& value : frame.xyz) value += 1e-4F * static_cast<float>(i);
+      ASSERT_TRUE(RoundPositions(frame.xyz));
+      std::vector<std::uint8_t> bytes;
+      ASSERT_TRUE(bus::EncodeCdr(frame, &bytes));
+      bus::RawSample sample{TopicId::kTissueFrame, {1}, i, 1000, static_cast<std::int64_t>(i) * 1000, {}, {}};
+      constexpr std::size_t kEncapsulation_B = 4;
+      sample.head = std::as_bytes(std::span(bytes)).first(kEncapsulation_B);
+      sample.body = std::as_bytes(std::span(bytes)).subspan(kEncapsulation_B);
+      recorder.Receive(sample, [] { return true; });
+      sent.push_back(std::move(frame));
     }
-    EXPECT_LT(fs::file_size(file), 40'000u);
-    const fs::path copy = folder_ / "copy.mcap";
-    fs::remove(copy);
-    EXPECT_TRUE(Recover(file, copy).empty());
-    for (const fs::path& from : {file, copy}) {
-      Recording recording(from);
-      Entry entry;
-      std::size_t read = 0;
-      while (recording.Next(&entry)) {
-        TissueFrame frame;
-        ASSERT_TRUE(bus::DecodeCdr(entry.message.data, &frame));
-        TissueFrame expected = sent[read++];
-        for (float& value : expected.xyz) value = recording::RoundedTo(step_m, value);
-        EXPECT_TRUE(Same(frame, expected)) << from << " " << read;
-        for (std::size_t i = 0; i < frame.xyz.size(); ++i) {
-          ASSERT_NEAR(frame.xyz[i], sent[read - 1].xyz[i], 0.51 * static_cast<double>(step_m));
-        }
-      }
-      EXPECT_EQ(read, sent.size());
+  }
+  EXPECT_LT(fs::file_size(file), 40'000u);
+  EXPECT_TRUE(Recover(file, copy).empty());
+  for (const fs::path& from : {file, copy}) {
+    Recording recording(from);
+    Entry entry;
+    std::size_t read = 0;
+    while (recording.Next(&entry)) {
+      TissueFrame frame;
+      ASSERT_TRUE(bus::DecodeCdr(entry.message.data, &frame));
+      EXPECT_TRUE(Same(frame, sent[read++])) << from << " " << read;
     }
+    EXPECT_EQ(read, sent.size());
   }
 }
 

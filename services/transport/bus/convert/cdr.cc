@@ -4,6 +4,8 @@
 #include <fastcdr/FastBuffer.h>
 #include <fastcdr/exceptions/Exception.h>
 
+#include <type_traits>
+
 #include "services/transport/bus/convert/convert.h"
 #include "services/transport/bus/convert/generated_types.h"
 
@@ -19,16 +21,14 @@ constexpr std::size_t kEncapsulation = 4;
 
 template <class T>
 bool DecodeCdr(std::span<const std::uint8_t> bytes, T* message) {
-  using Wire = WireOf<T>;
   if constexpr (Loanable<T>) {
-    return bytes.size() >= kEncapsulation + sizeof(Wire) &&
-           FromLoan(reinterpret_cast<const std::byte*>(bytes.data() + kEncapsulation), message);
+    return bytes.size() >= kEncapsulation && FromLoan(std::as_bytes(bytes.subspan(kEncapsulation)), message);
   } else {
     // The library only reads, but takes a non-const pointer.
     FastBuffer buffer(reinterpret_cast<char*>(const_cast<std::uint8_t*>(bytes.data())), bytes.size());
     Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
     try {
-      Wire wire;
+      WireOf<T> wire;
       cdr.read_encapsulation();
       wire.deserialize(cdr);
       FromWire(wire, message);
@@ -41,13 +41,14 @@ bool DecodeCdr(std::span<const std::uint8_t> bytes, T* message) {
 
 template <class T>
 bool EncodeCdr(const T& message, std::vector<std::uint8_t>* bytes) {
-  using Wire = WireOf<T>;
   if constexpr (Loanable<T>) {
-    bytes->assign(kEncapsulation + sizeof(Wire), 0);
+    std::size_t vertices = 0;
+    if constexpr (std::is_same_v<T, TissueFrame>) vertices = message.xyz.size() / 3;
+    bytes->assign(kEncapsulation + LoanBytes(&message, vertices), 0);
     (*bytes)[1] = 1;  // Little-endian CDR.
-    return ToLoan(message, reinterpret_cast<std::byte*>(bytes->data() + kEncapsulation));
+    return ToLoan(message, std::as_writable_bytes(std::span(*bytes)).subspan(kEncapsulation));
   } else {
-    Wire wire;
+    WireOf<T> wire;
     if (!ToWire(message, &wire)) return false;
     FastBuffer buffer;
     Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);

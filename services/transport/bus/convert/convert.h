@@ -21,26 +21,35 @@ template <class T>
 template <class T>
 void FromWire(const WireOf<T>& from, T* to);
 
-// The large topics are sent in loans. A loan is 4-byte aligned memory of sizeof(idl::T) bytes, so it is never accessed
-// as an idl::T: the header is copied in and out, the payload (floats, bytes) is used in place.
+// The large topics are sent in loans. A loan is 4-byte aligned memory that contains the message's CDR. It is never
+// accessed as a generated type: the header is copied in and out, the payload (blocks, bytes) is used in place.
 
-/// A view whose payload is in `loan` and whose header is `*header` (reset here); CloseLoan copies the header into the
-/// loan.
-[[nodiscard]] TissueFrame::View OpenLoan(std::byte* loan, TissueFrameHeader* header);
-[[nodiscard]] TemperaturePatch::View OpenLoan(std::byte* loan, TemperaturePatchHeader* header);
-[[nodiscard]] Picture::View OpenLoan(std::byte* loan, PictureHeader* header);
-/// False if the header's counts exceed the payload.
-[[nodiscard]] bool CloseLoan(const TissueFrameHeader& header, std::byte* loan);
-[[nodiscard]] bool CloseLoan(const TemperaturePatchHeader& header, std::byte* loan);
-[[nodiscard]] bool CloseLoan(const PictureHeader& header, std::byte* loan);
-/// Writes a complete message. False if it does not fit.
-[[nodiscard]] bool ToLoan(const TissueFrame& from, std::byte* loan);
-[[nodiscard]] bool ToLoan(const TemperaturePatch& from, std::byte* loan);
-[[nodiscard]] bool ToLoan(const Picture& from, std::byte* loan);
-/// Reads a complete message. False if the header's counts exceed the payload: then only the header is read.
-[[nodiscard]] bool FromLoan(const std::byte* loan, TissueFrame* to);
-[[nodiscard]] bool FromLoan(const std::byte* loan, TemperaturePatch* to);
-[[nodiscard]] bool FromLoan(const std::byte* loan, Picture* to);
+/// Bytes of the largest message: of a TissueFrame with so many vertices.
+[[nodiscard]] std::size_t LoanBytes(const TissueFrame*, std::size_t vertices);
+[[nodiscard]] std::size_t LoanBytes(const TemperaturePatch*, std::size_t);
+[[nodiscard]] std::size_t LoanBytes(const Picture*, std::size_t);
+/// Bytes that the message of a loan says that it has: more than there are if it was cut short.
+[[nodiscard]] std::size_t NeededBytes(TopicId topic, std::span<const std::byte> loan);
+/// Makes a message that no gate accepts.
+void SpoilLoan(std::span<std::byte> loan);
+
+/// A view for the message's writer: its header, and with TissueFrame its positions, are `*draft`'s (reset here), other
+/// payloads are in `loan`. CloseLoan completes the loan.
+[[nodiscard]] TissueFrame::View OpenLoan(std::byte* loan, TissueFrame* draft);
+[[nodiscard]] TemperaturePatch::View OpenLoan(std::byte* loan, TemperaturePatch* draft);
+[[nodiscard]] Picture::View OpenLoan(std::byte* loan, Picture* draft);
+/// False if the message does not fit, its header's counts are not those of the payload, or a position is not finite.
+[[nodiscard]] bool CloseLoan(const TissueFrame& draft, std::span<std::byte> loan);
+[[nodiscard]] bool CloseLoan(const TemperaturePatch& draft, std::span<std::byte> loan);
+[[nodiscard]] bool CloseLoan(const Picture& draft, std::span<std::byte> loan);
+/// Writes a complete message. False as for CloseLoan.
+[[nodiscard]] bool ToLoan(const TissueFrame& from, std::span<std::byte> loan);
+[[nodiscard]] bool ToLoan(const TemperaturePatch& from, std::span<std::byte> loan);
+[[nodiscard]] bool ToLoan(const Picture& from, std::span<std::byte> loan);
+/// Reads a complete message. False if the header's counts exceed the payload: then at most the header is read.
+[[nodiscard]] bool FromLoan(std::span<const std::byte> loan, TissueFrame* to);
+[[nodiscard]] bool FromLoan(std::span<const std::byte> loan, TemperaturePatch* to);
+[[nodiscard]] bool FromLoan(std::span<const std::byte> loan, Picture* to);
 // The session of a stamp exists on the wire only: ports set and check it.
 void SetSessionOfLoan(std::uint64_t session, std::byte* loan);
 /// Session of a serialised message: CDR without encapsulation, or a loan; 0: the bytes are too few.

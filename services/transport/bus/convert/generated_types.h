@@ -19,7 +19,7 @@ FULCRUM_MESSAGES(FULCRUM_TYPE_SUPPORT)
 template <class T>
 using WireOf = typename TypeSupportOf<T>::type::type;
 
-/// Whether T is sent as a loan, as its memory: for a plain type that is its CDR, too.
+/// Whether T is sent as a loan, as its memory, which is its CDR, too.
 template <class T>
 concept Loanable = requires {
   typename T::View;

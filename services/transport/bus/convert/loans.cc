@@ -2,24 +2,28 @@
 #include <algorithm>
 #include <cstring>
 
+#include "services/base/core/tissue_blocks.h"
 #include "services/transport/bus/convert/convert.h"
 #include "services/transport/bus/convert/pieces.h"
 
 namespace fulcrum::bus {
 
-static_assert(idl::MAX_TISSUE_VERTICES == kMaxTissueVertices && idl::MAX_TISSUE_FLOATS == 3 * kMaxTissueVertices);
+static_assert(idl::MAX_TISSUE_BLOCKS == BlocksFor(kMaxTissueVertices));
+static_assert(idl::TISSUE_BLOCK_VERTICES == kBlockVertices && idl::TISSUE_BLOCK_OFFSETS == 3 * kBlockVertices);
 static_assert(idl::PATCH_TEXELS == kPatchTexels && idl::ATLAS_TEXELS == kAtlasTexels);
 static_assert(idl::PATCH_BYTES == 4 * kPatchTexels * kPatchTexels);
 static_assert(idl::MAX_PICTURE_BYTES == kMaxPictureBytes);
 
-// A plain type is its header followed by its payload, without padding, so the payload begins at sizeof(header).
-static_assert(sizeof(idl::TissueFrame) == sizeof(idl::TissueFrameHeader) + idl::MAX_TISSUE_FLOATS * sizeof(float));
+// A loan is the header followed by the payload, without padding, so the payload begins at sizeof(header). That of a
+// TissueFrame is a sequence: a number, and so many blocks as in memory.
+static_assert(sizeof(idl::TissueBlock) == sizeof(TissueBlock));
 static_assert(sizeof(idl::TemperaturePatch) == sizeof(idl::TemperaturePatchHeader) + idl::PATCH_BYTES);
 static_assert(sizeof(idl::Picture) == sizeof(idl::PictureHeader) + idl::MAX_PICTURE_BYTES);
 
 namespace {
 
-constexpr std::size_t kFrameOffset = sizeof(idl::TissueFrameHeader);
+constexpr std::size_t kBlockCountOffset = sizeof(idl::TissueFrameHeader);
+constexpr std::size_t kBlocksOffset = kBlockCountOffset + sizeof(std::uint32_t);
 constexpr std::size_t kPatchOffset = sizeof(idl::TemperaturePatchHeader);
 constexpr std::size_t kPictureOffset = sizeof(idl::PictureHeader);
 
@@ -62,51 +66,88 @@ std::uint64_t SessionOf(std::span<const std::byte> message) {
   return session;
 }
 
-TissueFrame::View OpenLoan(std::byte* loan, TissueFrameHeader* header) {
-  *header = {};
-  return {*header, {reinterpret_cast<float*>(loan + kFrameOffset), idl::MAX_TISSUE_FLOATS}};
+std::uint32_t BlockCountOf(const std::byte* loan) {
+  std::uint32_t blocks = 0;
+  std::memcpy(&blocks, loan + kBlockCountOffset, sizeof blocks);
+  return blocks;
 }
 
-bool CloseLoan(const TissueFrameHeader& header, std::byte* loan) {
-  if (header.vertex_count > kMaxTissueVertices) return false;
-  return PutHeader<idl::TissueFrameHeader>(header, loan);
+std::size_t LoanBytes(const TissueFrame*, std::size_t vertices) {
+  return kBlocksOffset + BlocksFor(vertices) * sizeof(TissueBlock);
+}
+std::size_t LoanBytes(const TemperaturePatch*, std::size_t) { return sizeof(idl::TemperaturePatch); }
+std::size_t LoanBytes(const Picture*, std::size_t) { return sizeof(idl::Picture); }
+
+std::size_t NeededBytes(TopicId topic, std::span<const std::byte> loan) {
+  switch (topic) {
+    case TopicId::kTemperaturePatch:
+      return sizeof(idl::TemperaturePatch);
+    case TopicId::kPicture:
+      return sizeof(idl::Picture);
+    default:
+      return kBlocksOffset +
+             (loan.size() < kBlocksOffset ? 0 : std::size_t{BlockCountOf(loan.data())} * sizeof(TissueBlock));
+  }
 }
 
-bool ToLoan(const TissueFrame& from, std::byte* loan) {
-  if (from.xyz.size() != std::size_t{3} * from.header.vertex_count) return false;
-  if (!CloseLoan(from.header, loan)) return false;
-  if (!from.xyz.empty()) std::memcpy(loan + kFrameOffset, from.xyz.data(), from.xyz.size() * sizeof(float));
-  return true;
+void SpoilLoan(std::span<std::byte> loan) {
+  std::memset(loan.data(), 0, loan.size());
+  idl::Stamp none;
+  none.stamp_ns(-1);
+  std::memcpy(loan.data(), static_cast<const void*>(&none), std::min(sizeof none, loan.size()));
 }
 
-bool FromLoan(const std::byte* loan, TissueFrame* to) {
-  GetHeader<idl::TissueFrameHeader>(loan, &to->header);
-  if (to->header.vertex_count > kMaxTissueVertices) return false;
-  const auto* xyz = reinterpret_cast<const float*>(loan + kFrameOffset);
-  to->xyz.assign(xyz, xyz + std::size_t{3} * to->header.vertex_count);
+TissueFrame::View OpenLoan(std::byte*, TissueFrame* draft) {
+  draft->header = {};
+  draft->xyz.clear();
+  return {draft->header, draft->xyz};
+}
+
+bool CloseLoan(const TissueFrame& draft, std::span<std::byte> loan) { return ToLoan(draft, loan); }
+
+bool ToLoan(const TissueFrame& from, std::span<std::byte> loan) {
+  const std::size_t count = from.header.vertex_count;
+  if (count > kMaxTissueVertices || from.xyz.size() != 3 * count || LoanBytes(&from, count) > loan.size()) return false;
+  const auto blocks = static_cast<std::uint32_t>(BlocksFor(count));
+  std::memcpy(loan.data() + kBlockCountOffset, &blocks, sizeof blocks);
+  return PutHeader<idl::TissueFrameHeader>(from.header, loan.data()) &&
+         PackPositions(from.xyz, loan.data() + kBlocksOffset);
+}
+
+bool FromLoan(std::span<const std::byte> loan, TissueFrame* to) {
+  if (loan.size() < kBlocksOffset) return false;
+  GetHeader<idl::TissueFrameHeader>(loan.data(), &to->header);
+  const std::size_t count = to->header.vertex_count;
+  if (count > kMaxTissueVertices || BlockCountOf(loan.data()) != BlocksFor(count) ||
+      LoanBytes(to, count) > loan.size()) {
+    return false;
+  }
+  to->xyz.resize(3 * count);
+  UnpackPositions(loan.data() + kBlocksOffset, to->xyz);
   return true;
 }
 
 Stamp StampOfLoan(const std::byte* loan, const TissueFrame*) { return StampOfHeader<idl::TissueFrameHeader>(loan); }
 
-TemperaturePatch::View OpenLoan(std::byte* loan, TemperaturePatchHeader* header) {
-  *header = {};
-  return {*header, {reinterpret_cast<std::uint8_t*>(loan + kPatchOffset), idl::PATCH_BYTES}};
+TemperaturePatch::View OpenLoan(std::byte* loan, TemperaturePatch* draft) {
+  draft->header = {};
+  return {draft->header, {reinterpret_cast<std::uint8_t*>(loan + kPatchOffset), idl::PATCH_BYTES}};
 }
 
-bool CloseLoan(const TemperaturePatchHeader& header, std::byte* loan) {
-  return PutHeader<idl::TemperaturePatchHeader>(header, loan);
+bool CloseLoan(const TemperaturePatch& draft, std::span<std::byte> loan) {
+  return PutHeader<idl::TemperaturePatchHeader>(draft.header, loan.data());
 }
 
-bool ToLoan(const TemperaturePatch& from, std::byte* loan) {
-  if (from.texels.size() != idl::PATCH_BYTES || !CloseLoan(from.header, loan)) return false;
-  std::memcpy(loan + kPatchOffset, from.texels.data(), from.texels.size());
-  return true;
+bool ToLoan(const TemperaturePatch& from, std::span<std::byte> loan) {
+  if (from.texels.size() != idl::PATCH_BYTES || loan.size() < sizeof(idl::TemperaturePatch)) return false;
+  std::memcpy(loan.data() + kPatchOffset, from.texels.data(), from.texels.size());
+  return CloseLoan(from, loan);
 }
 
-bool FromLoan(const std::byte* loan, TemperaturePatch* to) {
-  GetHeader<idl::TemperaturePatchHeader>(loan, &to->header);
-  const auto* texels = reinterpret_cast<const std::uint8_t*>(loan + kPatchOffset);
+bool FromLoan(std::span<const std::byte> loan, TemperaturePatch* to) {
+  if (loan.size() < sizeof(idl::TemperaturePatch)) return false;
+  GetHeader<idl::TemperaturePatchHeader>(loan.data(), &to->header);
+  const auto* texels = reinterpret_cast<const std::uint8_t*>(loan.data() + kPatchOffset);
   to->texels.assign(texels, texels + idl::PATCH_BYTES);
   return true;
 }
@@ -115,25 +156,28 @@ Stamp StampOfLoan(const std::byte* loan, const TemperaturePatch*) {
   return StampOfHeader<idl::TemperaturePatchHeader>(loan);
 }
 
-Picture::View OpenLoan(std::byte* loan, PictureHeader* header) {
-  *header = {};
-  return {*header, {reinterpret_cast<std::uint8_t*>(loan + kPictureOffset), idl::MAX_PICTURE_BYTES}};
+Picture::View OpenLoan(std::byte* loan, Picture* draft) {
+  draft->header = {};
+  return {draft->header, {reinterpret_cast<std::uint8_t*>(loan + kPictureOffset), idl::MAX_PICTURE_BYTES}};
 }
 
-bool CloseLoan(const PictureHeader& header, std::byte* loan) {
-  return header.size <= kMaxPictureBytes && PutHeader<idl::PictureHeader>(header, loan);
+bool CloseLoan(const Picture& draft, std::span<std::byte> loan) {
+  return draft.header.size <= kMaxPictureBytes && PutHeader<idl::PictureHeader>(draft.header, loan.data());
 }
 
-bool ToLoan(const Picture& from, std::byte* loan) {
-  if (from.jpeg.size() != from.header.size || !CloseLoan(from.header, loan)) return false;
-  if (!from.jpeg.empty()) std::memcpy(loan + kPictureOffset, from.jpeg.data(), from.jpeg.size());
+bool ToLoan(const Picture& from, std::span<std::byte> loan) {
+  if (from.jpeg.size() != from.header.size || loan.size() < sizeof(idl::Picture) || !CloseLoan(from, loan)) {
+    return false;
+  }
+  if (!from.jpeg.empty()) std::memcpy(loan.data() + kPictureOffset, from.jpeg.data(), from.jpeg.size());
   return true;
 }
 
-bool FromLoan(const std::byte* loan, Picture* to) {
-  GetHeader<idl::PictureHeader>(loan, &to->header);
+bool FromLoan(std::span<const std::byte> loan, Picture* to) {
+  if (loan.size() < sizeof(idl::Picture)) return false;
+  GetHeader<idl::PictureHeader>(loan.data(), &to->header);
   if (to->header.size > kMaxPictureBytes) return false;
-  const auto* jpeg = reinterpret_cast<const std::uint8_t*>(loan + kPictureOffset);
+  const auto* jpeg = reinterpret_cast<const std::uint8_t*>(loan.data() + kPictureOffset);
   to->jpeg.assign(jpeg, jpeg + to->header.size);
   return true;
 }

@@ -23,8 +23,8 @@ enum class FarLane : std::uint8_t {
   /// Reliable and in order while both are connected; the newest kOrderedBacklog packets wait for a slow connection.
   kOrdered,
 };
-inline constexpr std::size_t kStreamPacket_B = 1300;  ///< One Ethernet frame, encrypted or not.
-inline constexpr std::size_t kOrderedPacket_B = 128 * 1024;
+inline constexpr std::size_t kStreamPacket_B = 1300;          ///< One Ethernet frame, encrypted or not.
+inline constexpr std::size_t kOrderedPacket_B = 1024 * 1024;  ///< More than a TopologyState.
 inline constexpr int kOrderedBacklog = 256;
 
 struct FarSettings {

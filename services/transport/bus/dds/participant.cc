@@ -128,6 +128,7 @@ std::uint64_t SessionOf(const DdsSettings& settings) {
 struct DdsParticipant::Impl {
   Impl(const DdsSettings& settings, std::uint64_t hash)
       : schema_hash(hash),
+        tissue_vertices(std::min<std::size_t>(settings.tissue_vertices, kMaxTissueVertices)),
         shared_memory(settings.shared_memory),
         security(settings.security),
         gathering(settings.gathers ? std::make_shared<dds::Gathering>() : nullptr),
@@ -174,15 +175,24 @@ struct DdsParticipant::Impl {
     const std::lock_guard lock(mutex);
     fast::Topic*& topic = topics[static_cast<std::size_t>(role.id)];
     if (topic != nullptr) return topic;
-    fast::TypeSupport type(new dds::CheckedType<T>());
-    if constexpr (Loanable<T>) {
-      // Both conditions together mean that memory and wire layout are equal, which a loan requires.
-      if (!type->is_plain() || type->m_typeSize != sizeof(WireOf<T>) + 4) {
-        throw std::logic_error(std::string(role.name) + ": the generated type is not plain");
-      }
-    }
+    fast::TypeSupport type(MakeType<T>());
     type->setName(TypeName(role).c_str());
     return topic = MakeTopic(role, type);
+  }
+
+  template <class T>
+  fast::TopicDataType* MakeType() const {
+    if constexpr (Loanable<T>) {
+      return new dds::LoanType(kTopicOf<T>, loan_B<T>());
+    } else {
+      return new dds::CheckedType<T>();
+    }
+  }
+
+  /// Size of a large topic's loans.
+  template <Loanable T>
+  [[nodiscard]] std::size_t loan_B() const {
+    return LoanBytes(static_cast<const T*>(nullptr), tissue_vertices);
   }
 
   fast::Topic* MakeTopic(const TopicRole& role, const fast::TypeSupport& type) {
@@ -212,6 +222,7 @@ struct DdsParticipant::Impl {
   }
 
   const std::uint64_t schema_hash;
+  const std::size_t tissue_vertices;
   std::filesystem::path shared_memory;
   const Security security;
   const std::shared_ptr<dds::Gathering> gathering;
@@ -254,15 +265,20 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
   fast::Topic* topic = impl_->TopicFor<T>();
   fast::DataWriterQos qos;
   Apply(role.quality, role.quality.writer_depth, impl_->SharedMemoryFor(role), &qos);
-  const bool fragmented =
-      impl_->SharedMemoryFor(role).empty() && typename TypeSupportOf<T>::type().m_typeSize > kDatagram_B;
+  const std::unique_ptr<fast::TopicDataType> type(impl_->MakeType<T>());
+  const bool fragmented = impl_->SharedMemoryFor(role).empty() && type->m_typeSize > kDatagram_B;
   // A reliable writer sends several samples in one datagram when it repeats them.
   const bool packed = impl_->security.encrypt && (fragmented || role.quality.delivery == Delivery::kReliable);
   qos.publish_mode().kind = fragmented || packed ? fast::ASYNCHRONOUS_PUBLISH_MODE : fast::SYNCHRONOUS_PUBLISH_MODE;
   if (packed) qos.publish_mode().flow_controller_name = dds::kPacking;
   const WorkingIn here(impl_->shared_memory);
-  auto port =
-      std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos, &impl_->audience, impl_->session.session);
+  std::unique_ptr<dds::DdsOutput<T>> port;
+  if constexpr (Loanable<T>) {
+    port = std::make_unique<dds::DdsOutput<T>>(impl_->loan_B<T>(), impl_->publisher, topic, qos, &impl_->audience,
+                                               impl_->session.session);
+  } else {
+    port = std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos, &impl_->audience, impl_->session.session);
+  }
   if (!port->ok()) throw InputError(impl_->CannotMake(role, "writer"));
   ++impl_->writers;
   if (role.quality.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
@@ -271,8 +287,9 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
 
 std::unique_ptr<RawInput> DdsParticipant::MakeRawInput(TopicId id, RawSink sink) {
   const TopicRole& role = RoleOf(id);
-  const std::uint32_t payload_B =
-      WithMessageOf(id, []<class T>(std::type_identity<T>) { return typename TypeSupportOf<T>::type().m_typeSize; });
+  const std::uint32_t payload_B = WithMessageOf(id, [this]<class T>(std::type_identity<T>) {
+    return std::unique_ptr<fast::TopicDataType>(impl_->MakeType<T>())->m_typeSize;
+  });
   const bool plain = role.quality.path == Path::kSharedMemory;
   fast::Topic* topic =
       impl_->MakeTopic(role, fast::TypeSupport(new dds::RawType(impl_->TypeName(role), payload_B, plain)));

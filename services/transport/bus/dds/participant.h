@@ -34,6 +34,8 @@ struct DdsSettings {
   /// silent node. A process that merely stood still for longer than its lease is removed by a peer without removing
   /// that peer itself; the peer then receives it again only after long, with keys never.
   int lease_s = 8;
+  /// Largest TissueFrame of this participant's ports: a writer's memory is made for it.
+  int tissue_vertices = kMaxTissueVertices;
   /// Raw inputs let small samples gather for 8 ms: a thread that wakes for each sample would need twice the processor
   /// time.
   bool gathers = false;

@@ -14,6 +14,7 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <functional>
+#include <span>
 #include <thread>
 #include <utility>
 
@@ -181,12 +182,14 @@ class DdsInput<T> final : public InputBase<T> {
   }
 
   bool Choose(T* sample) {
-    // buffer() and not operator[]: a loan is not aligned enough for a reference to WireOf<T>.
     auto* const* data = loans_.buffer();
-    const auto loan = [data](int i) { return static_cast<const std::byte*>(data[i]); };
+    // Of the largest message: the library does not say how large the writer's pool is. A writer's count of vertices is
+    // that of its pool at most (CloseLoan).
+    static const std::size_t loan_B = LoanBytes(sample, kMaxTissueVertices);
+    const auto loan = [data](int i) { return std::span(reinterpret_cast<const std::byte*>(data[i]), loan_B); };
     for (int i = static_cast<int>(infos_.length()) - 1; i >= 0; --i) {
       if (!infos_[i].valid_data) continue;
-      const std::uint64_t session = SessionOf({loan(i), sizeof(WireOf<T>)});
+      const std::uint64_t session = SessionOf(loan(i));
       const bool complete = FromLoan(loan(i), &candidate_);
       // The writer may have reused the memory during the copy: only now is it known whether the copy is complete.
       if (!this->reader_->is_sample_valid(data[i], &infos_[i])) continue;
@@ -197,8 +200,8 @@ class DdsInput<T> final : public InputBase<T> {
       }
       for (int older = 0; older < i; ++older) {
         if (!infos_[older].valid_data) continue;
-        if (this->check_->IsForeign(SessionOf({loan(older), sizeof(WireOf<T>)}))) continue;
-        this->account_.Supersede(StampOfLoan(loan(older), sample));
+        if (this->check_->IsForeign(SessionOf(loan(older)))) continue;
+        this->account_.Supersede(StampOfLoan(loan(older).data(), sample));
       }
       this->account_.Accept(StampOf(candidate_));
       std::swap(*sample, candidate_);
@@ -207,7 +210,7 @@ class DdsInput<T> final : public InputBase<T> {
     return false;
   }
 
-  fast::LoanableSequence<WireOf<T>> loans_;
+  fast::LoanableSequence<std::byte> loans_;
   fast::SampleInfoSeq infos_;
   T candidate_;
 };
@@ -281,17 +284,19 @@ class DdsOutput final : public OutputBase<T> {
 template <Loanable T>
 class DdsOutput<T> final : public OutputBase<T> {
  public:
-  using OutputBase<T>::OutputBase;
+  /// @param loan_B size of the topic's type.
+  DdsOutput(std::size_t loan_B, fast::Publisher* publisher, fast::Topic* topic, const fast::DataWriterQos& qos,
+            Audience* audience, std::uint64_t session)
+      : OutputBase<T>(publisher, topic, qos, audience, session), loan_B_(loan_B) {}
 
   bool Write(const T& sample) noexcept override {
-    return Lend([&sample](std::byte* loan) { return ToLoan(sample, loan); });
+    return Lend([&sample](std::span<std::byte> loan) { return ToLoan(sample, loan); });
   }
 
   bool WriteInPlace(const typename LoanOutput<T>::Fill& fill) noexcept override {
-    return Lend([&fill](std::byte* loan) {
-      decltype(T::header) header;
-      fill(OpenLoan(loan, &header));
-      return CloseLoan(header, loan);
+    return Lend([&](std::span<std::byte> loan) {
+      fill(OpenLoan(loan.data(), &draft_));
+      return CloseLoan(draft_, loan);
     });
   }
 
@@ -305,7 +310,7 @@ class DdsOutput<T> final : public OutputBase<T> {
       if (this->writer_->loan_sample(loan, Init::NO_LOAN_INITIALIZATION) != ReturnCode::RETCODE_OK) {
         return this->Count(false);
       }
-      const bool filled = fill(static_cast<std::byte*>(loan));
+      const bool filled = fill(std::span(static_cast<std::byte*>(loan), loan_B_));
       if (filled) SetSessionOfLoan(this->session_, static_cast<std::byte*>(loan));
       if (filled && this->writer_->write(loan)) return this->Count(true);
     } catch (...) {
@@ -318,6 +323,9 @@ class DdsOutput<T> final : public OutputBase<T> {
     }
     return this->Count(false);
   }
+
+  const std::size_t loan_B_;
+  T draft_;
 };
 
 }  // namespace fulcrum::bus::dds

@@ -2,6 +2,7 @@
 
 #include <time.h>
 
+#include <algorithm>
 #include <cstring>
 #include <optional>
 
@@ -105,7 +106,8 @@ void RawReader::TakeLoans(fast::DataReader* reader) {
       const auto* loan = static_cast<const std::byte*>(loans_.buffer()[i]);
       RawSample sample = Describe(infos_[i]);
       sample.head = kEncapsulation;
-      sample.body = {loan, payload_B_ - kEncapsulation.size()};
+      const std::span whole(loan, payload_B_ - kEncapsulation.size());
+      sample.body = whole.first(std::min(whole.size(), NeededBytes(role_.id, whole)));
       if (check_->IsForeign(SessionOf(sample.body))) continue;
       struct {
         fast::DataReader* reader;

@@ -73,7 +73,8 @@ function difference(ours, theirs, path) {
 const lastWords = new Map();
 
 /** The TissueFrame in a RecordedTissueFrame, decoded as services/records/recording/point_coding.h says. */
-function frameOf({ header, step_m: step, kind, value_count: count, residuals }, channel) {
+function frameOf({ header, kind, block_count: blocks, residuals }, channel) {
+  const count = 192 * blocks;
   const last = kind === 0 ? new Int32Array(count) : lastWords.get(channel);
   const words = new Int32Array(count);
   for (let i = 0; i < count; ++i) {
@@ -85,11 +86,10 @@ function frameOf({ header, step_m: step, kind, value_count: count, residuals }, 
     words[i] = ((zigzag >>> 1) ^ -(zigzag & 1)) + neighbour + last[i];
   }
   lastWords.set(channel, words);
-  if (kind > 2 || step === 0) {
-    throw new Error(`a frame of kind ${kind} and step ${step}`);
+  if (kind > 2) {
+    throw new Error(`a frame of kind ${kind}`);
   }
-  const xyz = new Float32Array(3 * header.vertex_count);
-  words.forEach((word, i) => (xyz[i] = word * step));
+  const xyz = Float32Array.from(words.subarray(0, 3 * header.vertex_count), (word) => 5e-6 * word);
   return { header, xyz };
 }
 
