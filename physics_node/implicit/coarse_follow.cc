@@ -89,7 +89,12 @@ void CoarseSpace::ScaleHats(const Sheet& sheet) {
 }
 
 void CoarseSpace::UpdateRegions(const Regions& regions) {
-  coarse_off_ = !regions.all_computed();
+  coarse_off_ = true;
+  for (int body = 0; body < regions.partition().body_count(); ++body) coarse_off_ &= !regions.whole(body);
+  grid_.off.clear();
+  for (std::size_t node = 0; node < grid_.body.size(); ++node) {
+    if (!regions.whole(grid_.body[node])) grid_.off.push_back(static_cast<int>(node));
+  }
   blocks_.off.assign(static_cast<std::size_t>(hats_.rows), 0);
   for (int r = 0; r < hats_.rows; ++r) {
     const auto i = static_cast<std::size_t>(r);

@@ -243,6 +243,9 @@ void CoarseSpace::BuildLattice(const TissueScene& scene, const ElasticModel& mod
     weights.new_cell = v == 0 || weights.node != grid_.tube_weights.back().node;
     grid_.tube_weights.push_back(weights);
   }
+  grid_.body.assign(static_cast<std::size_t>(grid_.nodes), 0);
+  for (const auto& [key, node] : numbers) grid_.body[node] = static_cast<int>(key.first);
+  grid_.off.reserve(grid_.body.size());
   std::vector<Vec3d> place;
   for (int i = 0; i < grid_.rows; ++i) {
     for (int j = 0; j < grid_.columns; ++j) {

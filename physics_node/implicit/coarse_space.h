@@ -48,8 +48,9 @@ class CoarseSpace {
   /// Blocks of hats are sampled at their middle. Where a cut goes through the samples they are scaled to the edges that
   /// are left to the whole hat; too soft a block would overshoot.
   void ScaleHats(const Sheet& sheet);
-  /// While not all is computed the coarse nodes are off, and so are hats that reach into what is not: cut off at the
-  /// border they would cost far more energy than their blocks contain.
+  /// Coarse nodes of a body that is not computed as a whole are off, and so are hats that reach into what is not: cut
+  /// off at the border they would cost far more energy than their blocks contain. They stay in the matrix: in the
+  /// preconditioner such a body yields to the others as if it were awake.
   void UpdateRegions(const Regions& regions);
   /// While the organ is folded the coarse nodes leave it out: their matrix is that of the organ at rest, and in folds
   /// the organ is a hundred times as stiff.
@@ -112,6 +113,8 @@ class CoarseSpace {
     std::vector<CellPlace> row_place, column_place;  ///< By row and by column of the membrane.
     FloatArray column_share;  ///< [columns][width], part of a coarse column in a float of a row of hats.
     std::vector<LatticePlace> tube_weights;
+    std::vector<int> body;  ///< By node, as Partition::BodyOf.
+    std::vector<int> off;   ///< Nodes that are off.
 
     /// Nodes around a cell of the membrane, -1 where there is none.
     [[nodiscard]] std::array<int, 4> NodesOf(int row_cell, int column_cell) const;

@@ -244,6 +244,9 @@ void ImplicitSolver::SetVelocity(ParticleRef at, const Vec3f& v) {
   PutField(state_.velocity.data(), at, v);
   state_.regions.Wake(model_.partition.Of(at));
 }
-void ImplicitSolver::Stop() { std::fill_n(state_.velocity.data(), state_.velocity.size(), 0.0f); }
+void ImplicitSolver::Stop() {
+  std::fill_n(state_.velocity.data(), state_.velocity.size(), 0.0f);
+  state_.regions.SleepOthers();
+}
 
 }  // namespace fulcrum::physics::implicit

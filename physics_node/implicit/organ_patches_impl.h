@@ -168,8 +168,8 @@ inline void OrganLinearise(const Organ& organ, const OrganMatrix& matrix, const 
   const auto gather = [&](std::uint32_t n, float* data) { StoreQuad(PatchGradient(organ, point, n), data); };
   ForGroups(first, last, gather, [&](Group& group) {
     const Matrix3<F> f = LoadColumns3<kGroupFloats, F>(group.data), cofactor = Cofactor(f);
-    const F lambda = F::All(organ.lambda), mu = F::All(organ.mu), volume = F::Load(organ.volume + group.first);
-    const F shear = F::Load(organ.shear + group.first);
+    const F lambda = F::All(organ.lambda), mu = F::All(organ.mu), volume = F::LoadAny(organ.volume + group.first);
+    const F shear = F::LoadAny(organ.shear + group.first);
     const F j = Dot(f.c0, cofactor.c0), pressure = lambda * (j - F::All(1.0f)) - mu;
     const Matrix3<F> stress = {f.c0 * shear + cofactor.c0 * pressure, f.c1 * shear + cofactor.c1 * pressure,
                                f.c2 * shear + cofactor.c2 * pressure};
@@ -239,7 +239,7 @@ inline double OrganCurvature(const Organ& organ, const OrganMatrix& matrix, floa
     // Each edge is visited from both ends and contributes the share of that end.
     const V<F> edges = LoadPatches<kGroupFloats, F>(group.data + kEdgesAt).p,
                here = LoadPatches<kGroupFloats, F>(group.data + kOwnVertexAt).p;
-    const V<F> own = here * (F::Load(organ.mass + group.first) * F::All(inertia)) - edges;
+    const V<F> own = here * (F::LoadAny(organ.mass + group.first) * F::All(inertia)) - edges;
     alignas(64) float of_patch[kPatchLanes];
     (Dot(stress, d) + Dot(here, own)).Store(of_patch);
     for (std::uint32_t i = 0; i < group.count; ++i) {
@@ -276,10 +276,10 @@ inline double OrganEnergy(const Organ& organ, const Inertia& inertia, const Orga
   ForGroups(first, last, gather, [&](Group& group) {
     const Matrix3<F> f = LoadColumns3<kGroupFloats, F>(group.data);
     const F j = Dot(f.c0, Cross(f.c1, f.c2)) - F::All(1.0f);
-    const F density = F::All(0.5f) * F::Load(organ.shear + group.first) * (Dot(f, f) - F::All(3.0f)) -
+    const F density = F::All(0.5f) * F::LoadAny(organ.shear + group.first) * (Dot(f, f) - F::All(3.0f)) -
                       F::All(organ.mu) * j + F::All(0.5f * organ.lambda) * (j * j);
     alignas(64) float of_patch[kPatchLanes];
-    (density * F::Load(organ.volume + group.first)).Store(of_patch);
+    (density * F::LoadAny(organ.volume + group.first)).Store(of_patch);
     for (std::uint32_t i = 0; i < group.count; ++i) {
       sum += static_cast<double>(of_patch[i]);
     }

@@ -6,6 +6,7 @@
 #include "physics_node/implicit/elements.h"
 #include "physics_node/implicit/implicit_model.h"
 #include "physics_node/implicit/implicit_state.h"
+#include "services/base/core/solids.h"
 
 namespace fulcrum::physics::implicit {
 namespace {
@@ -145,7 +146,7 @@ Organ OrganModel::View() const {
 ImplicitModel::ImplicitModel(const TissueScene& scene, const ElasticModel& model, const ParticleStore& particles)
     : layout(particles),
       grid(particles.layout()),
-      partition(particles, JoinedParticles(model, particles)),
+      partition(particles, JoinedParticles(model, particles), SolidOfVertices(scene)),
       sheet(scene, model, particles),
       organ(model, particles.tube_count()),
       load(layout.floats),

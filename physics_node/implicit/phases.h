@@ -68,9 +68,10 @@ void ForPieces(const FieldLayout& layout, const Task& task, const Body& body) {
 /// body(region, first, end) for the rows or vertices of each region of a task.
 template <class Body>
 void ForRegions(const Partition& partition, const Task& task, const Body& body) {
-  const int size = task.sheet ? Partition::kRows : Partition::kVertices;
-  for (int first = task.first; first < task.end; first += size) {
-    body(partition.At(task.sheet, first), first, std::min(first + size, task.end));
+  for (int first = task.first; first < task.end;) {
+    const int region = partition.At(task.sheet, first), end = std::min(partition.Extent(region).end, task.end);
+    body(region, first, end);
+    first = end;
   }
 }
 

@@ -13,15 +13,26 @@ constexpr int kRegionsPerTask = 3;
 
 }  // namespace
 
-Partition::Partition(const ParticleStore& particles, std::span<const std::pair<ParticleRef, ParticleRef>> joined)
+Partition::Partition(const ParticleStore& particles, std::span<const std::pair<ParticleRef, ParticleRef>> joined,
+                     std::span<const Index> solid)
     : tube_floats_(particles.tube_floats()),
       stride_(particles.layout().stride),
       tube_count_(particles.tube_count()),
       rows_(particles.layout().rows),
       cols_(particles.layout().cols) {
-  const auto regions = [](std::uint32_t count, int of) { return (static_cast<int>(count) + of - 1) / of; };
-  sheet_regions_ = regions(rows_, kRows);
-  neighbours_.resize(static_cast<std::size_t>(sheet_regions_ + regions(tube_count_, kVertices)));
+  sheet_regions_ = (static_cast<int>(rows_) + kRows - 1) / kRows;
+  body_.assign(static_cast<std::size_t>(sheet_regions_), 0);
+  for (std::uint32_t v = 0; v < tube_count_; ++v) {
+    const int body = static_cast<int>(solid[v]);
+    const bool full = !first_vertex_.empty() && static_cast<int>(v) - first_vertex_.back() == kVertices;
+    if (first_vertex_.empty() || full || body != body_.back()) {
+      first_vertex_.push_back(static_cast<int>(v));
+      body_.push_back(body);
+    }
+    region_of_vertex_.push_back(sheet_regions_ + static_cast<int>(first_vertex_.size()) - 1);
+  }
+  first_vertex_.push_back(static_cast<int>(tube_count_));
+  neighbours_.resize(body_.size());
   const auto join = [&](int a, int b) {
     if (a != b) {
       neighbours_[static_cast<std::size_t>(a)].push_back(b);
@@ -49,8 +60,8 @@ Task Partition::Extent(int region) const {
   if (region < sheet_regions_) {
     return {true, region * kRows, std::min((region + 1) * kRows, static_cast<int>(rows_))};
   }
-  const int first = (region - sheet_regions_) * kVertices;
-  return {false, first, std::min(first + kVertices, static_cast<int>(tube_count_))};
+  const auto of_organ = static_cast<std::size_t>(region - sheet_regions_);
+  return {false, first_vertex_[of_organ], first_vertex_[of_organ + 1]};
 }
 
 int Partition::ParticlesOf(int region) const {
@@ -114,6 +125,10 @@ Regions::Regions(const Partition& partition) : partition_(partition), computed_(
   awake_.assign(size, 1);
   still_s_.assign(size, 0.0f);
   removed_.reserve(size);
+  bodies_.resize(static_cast<std::size_t>(partition.body_count()));
+  for (int region = 0; region < partition.count(); ++region) {
+    bodies_[static_cast<std::size_t>(partition.BodyOf(region))].particles += partition.ParticlesOf(region);
+  }
   (void)Rebuild();
 }
 
@@ -129,6 +144,15 @@ void Regions::Wake(int region) {
 void Regions::WakeAll() {
   for (int region = 0; region < partition_.count(); ++region) {
     Wake(region);
+  }
+}
+
+void Regions::SleepOthers() {
+  for (int region = 0; region < partition_.count(); ++region) {
+    std::uint8_t& awake = awake_[static_cast<std::size_t>(region)];
+    if (partition_.BodyOf(region) == 0 || awake == 0) continue;
+    awake = 0;
+    changed_ = true;
   }
 }
 
@@ -167,22 +191,29 @@ bool Regions::Rebuild() {
     return false;
   }
   changed_ = false;
-  const bool all = awake_part() > kLargestAwakePart;
-  if (all && all_computed_) {
-    return false;
+  for (Body& body : bodies_) body.awake = 0;
+  for (int region = 0; region < partition_.count(); ++region) {
+    if (awake_[static_cast<std::size_t>(region)] == 0) continue;
+    bodies_[static_cast<std::size_t>(partition_.BodyOf(region))].awake += partition_.ParticlesOf(region);
   }
-  all_computed_ = all;
+  for (Body& body : bodies_) {
+    body.whole = static_cast<float>(body.awake) > kLargestAwakePart * static_cast<float>(body.particles);
+  }
   removed_.clear();
+  bool differs = false;
+  all_computed_ = true;
   for (int region = 0; region < partition_.count(); ++region) {
     const auto i = static_cast<std::size_t>(region);
-    const bool now = all || awake_[i] != 0;
+    const bool now = awake_[i] != 0 || whole(partition_.BodyOf(region));
     if (computed_.marked[i] != 0 && !now) {
       removed_.push_back(region);
     }
+    differs |= (computed_.marked[i] != 0) != now;
+    all_computed_ &= now;
     computed_.marked[i] = now ? 1 : 0;
   }
-  partition_.FindTasks(&computed_);
-  return true;
+  if (differs) partition_.FindTasks(&computed_);
+  return differs;
 }
 
 void Regions::Widen(RegionSet* set) const {

@@ -1,8 +1,8 @@
 // Which regions of the tissue are computed. The membrane is divided into bands of rows, the organ into runs of vertices
 // (Partition, built once). A region that stays still for a while falls asleep; a moving one keeps its neighbours awake,
 // so movement spreads by one region a substep, and to the regions awake a sleeping one is a body that does not yield.
-// Contact, grasp, cuts and heat wake explicitly. Sleep saves time only where little is awake: while more than
-// kLargestAwakePart is, all regions are computed.
+// Contact, grasp, cuts and heat wake explicitly. Sleep within a body saves time only where little of it is awake: while
+// more than kLargestAwakePart is, all its regions are computed.
 #pragma once
 
 #include <cstdint>
@@ -36,15 +36,20 @@ class Partition {
   /// tissue awake; large against the cost of claiming a task.
   static constexpr int kRows = 8, kVertices = 64;
 
-  /// `joined`: pairs of particles that forces join beyond rows and vertices next to each other.
-  Partition(const ParticleStore& particles, std::span<const std::pair<ParticleRef, ParticleRef>> joined);
+  /// `joined`: pairs of particles that forces join beyond rows and vertices next to each other. `solid`: of each vertex
+  /// of the organ, ascending; a region has vertices of one only.
+  Partition(const ParticleStore& particles, std::span<const std::pair<ParticleRef, ParticleRef>> joined,
+            std::span<const Index> solid);
 
   [[nodiscard]] int count() const { return static_cast<int>(neighbours_.size()); }
   [[nodiscard]] int Of(ParticleRef at) const;
   /// Of a row of the membrane or a vertex of the organ.
   [[nodiscard]] int At(bool sheet, int place) const {
-    return sheet ? place / kRows : sheet_regions_ + place / kVertices;
+    return sheet ? place / kRows : region_of_vertex_[static_cast<std::size_t>(place)];
   }
+  /// The body of a region: 0 the membrane with the organ, to which it is bound, 1 and so on the other solids.
+  [[nodiscard]] int BodyOf(int region) const { return body_[static_cast<std::size_t>(region)]; }
+  [[nodiscard]] int body_count() const { return body_.empty() ? 0 : body_.back() + 1; }
   /// Rows or vertices of a region.
   [[nodiscard]] Task Extent(int region) const;
   [[nodiscard]] std::span<const int> neighbours(int region) const {
@@ -66,6 +71,9 @@ class Partition {
 
   std::uint32_t tube_floats_, stride_, tube_count_, rows_, cols_;
   int sheet_regions_ = 0;
+  std::vector<int> region_of_vertex_;
+  std::vector<int> first_vertex_;             ///< By region of the organ, and the number of vertices.
+  std::vector<int> body_;                     ///< By region, ascending.
   std::vector<std::vector<int>> neighbours_;  ///< By region.
 };
 
@@ -75,8 +83,8 @@ class Regions {
   /// A region that moves slower than this for so long falls asleep [m/s], [s]: 1 um in a step of 10 ms for 50 steps, as
   /// for the tissue as a whole (simulation/tissue_sleep.cc).
   static constexpr float kStillSpeed_m_s = 1e-4f, kStillTime_s = 0.5f;
-  /// Of all particles; with more awake all are computed. A large sheet is solved badly without coarse nodes, and these
-  /// need all regions. Assumed.
+  /// Of the particles of a body; with more awake all are computed. A large sheet is solved badly without coarse nodes,
+  /// and these need whole bodies. Assumed.
   static constexpr float kLargestAwakePart = 0.35f;
 
   /// All awake. `partition` must outlive this.
@@ -86,6 +94,8 @@ class Regions {
   [[nodiscard]] bool computed(int region) const { return computed_.marked[static_cast<std::size_t>(region)] != 0; }
   [[nodiscard]] bool none_computed() const { return computed_.tasks.empty(); }
   [[nodiscard]] bool all_computed() const { return all_computed_; }
+  /// All regions of a body are computed.
+  [[nodiscard]] bool whole(int body) const { return bodies_[static_cast<std::size_t>(body)].whole; }
   [[nodiscard]] const RegionSet& computed() const { return computed_; }
   /// Part of all particles that is awake, also while all are computed.
   [[nodiscard]] float awake_part() const;
@@ -93,6 +103,8 @@ class Regions {
   /// Keeps awake, or wakes; in force after the next Rebuild.
   void Wake(int region);
   void WakeAll();
+  /// All bodies but the membrane with the organ fall asleep: nothing has moved for a while.
+  void SleepOthers();
   /// At the end of a substep of h: puts to sleep and wakes by the largest speed of each region [m/s].
   void UpdateSleep(std::span<const float> speed, float h);
   /// True when the computed regions have changed since the last call; then the tasks are new.
@@ -109,6 +121,11 @@ class Regions {
   std::vector<float> still_s_;  ///< By region: since when it has been still [s].
   RegionSet computed_;
   std::vector<int> removed_;
+  struct Body {
+    int particles = 0, awake = 0;
+    bool whole = false;
+  };
+  std::vector<Body> bodies_;
   bool changed_ = true, all_computed_ = false;
 };
 

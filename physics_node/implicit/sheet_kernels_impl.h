@@ -165,34 +165,47 @@ inline double SheetEnergy(const Sheet& sheet, const Inertia& inertia, const Shee
   return sum;
 }
 
-inline void Combine(const float* z, float beta, float* p, std::size_t count) {
-  const F8 b = F8::All(beta);
-  for (std::size_t i = 0; i < count; i += kLanes) {
-    (F8::Load(z + i) + F8::Load(p + i) * b).Store(p + i);
+/// body(lanes, i) for `count` floats from any vertex on: eight at a time, then the rest one by one. `lanes` tells body
+/// the type to load.
+template <class Body>
+FULCRUM_INLINE void ForFloats(std::size_t count, const Body& body) {
+  std::size_t i = 0;
+  for (; i + kLanes <= count; i += kLanes) {
+    body(F8(), i);
   }
+  for (; i < count; ++i) {
+    body(0.0f, i);
+  }
+}
+FULCRUM_INLINE F8 LoadAt(F8, const float* p) { return F8::LoadAny(p); }
+FULCRUM_INLINE float LoadAt(float, const float* p) { return *p; }
+FULCRUM_INLINE void StoreAt(F8 v, float* p) { v.StoreAny(p); }
+FULCRUM_INLINE void StoreAt(float v, float* p) { *p = v; }
+FULCRUM_INLINE F8 AllOf(F8, float s) { return F8::All(s); }
+FULCRUM_INLINE float AllOf(float, float s) { return s; }
+
+inline void Combine(const float* z, float beta, float* p, std::size_t count) {
+  ForFloats(count,
+            [=](auto l, std::size_t i) { StoreAt(LoadAt(l, z + i) + LoadAt(l, p + i) * AllOf(l, beta), p + i); });
 }
 
 inline void StartFields(float alpha, const float* p, const float* q, float* d, float* r, std::size_t count) {
-  const F8 a = F8::All(alpha);
-  for (std::size_t i = 0; i < count; i += kLanes) {
-    (F8::Load(p + i) * a).Store(d + i);
-    (F8::Load(r + i) - F8::Load(q + i) * a).Store(r + i);
-  }
+  ForFloats(count, [=](auto l, std::size_t i) {
+    StoreAt(LoadAt(l, p + i) * AllOf(l, alpha), d + i);
+    StoreAt(LoadAt(l, r + i) - LoadAt(l, q + i) * AllOf(l, alpha), r + i);
+  });
 }
 
 inline void AdvanceFields(float alpha, const float* p, const float* q, float* d, float* r, std::size_t count) {
-  const F8 a = F8::All(alpha);
-  for (std::size_t i = 0; i < count; i += kLanes) {
-    (F8::Load(d + i) + F8::Load(p + i) * a).Store(d + i);
-    (F8::Load(r + i) - F8::Load(q + i) * a).Store(r + i);
-  }
+  ForFloats(count, [=](auto l, std::size_t i) {
+    StoreAt(LoadAt(l, d + i) + LoadAt(l, p + i) * AllOf(l, alpha), d + i);
+    StoreAt(LoadAt(l, r + i) - LoadAt(l, q + i) * AllOf(l, alpha), r + i);
+  });
 }
 
 inline void AddFields(float alpha, const float* p, float* d, std::size_t count) {
-  const F8 a = F8::All(alpha);
-  for (std::size_t i = 0; i < count; i += kLanes) {
-    (F8::Load(d + i) + F8::Load(p + i) * a).Store(d + i);
-  }
+  ForFloats(count,
+            [=](auto l, std::size_t i) { StoreAt(LoadAt(l, d + i) + LoadAt(l, p + i) * AllOf(l, alpha), d + i); });
 }
 
 inline bool Within(const float* p, float limit, std::size_t count, bool xyzw) {

@@ -201,7 +201,7 @@ void LineariseVerticesAndLevels(const SolverContext& context, const Inertia& ine
     });
   };
   ForTasksAndSideTask(&context.workers, state->regions.computed(), body, [&] {
-    if (state->coarse_due && state->regions.all_computed()) {
+    if (state->coarse_due && state->regions.whole(0)) {
       state->coarse.AssembleNextPart(system.sheet, system.sheet_matrix, inertia.inertia);
       state->coarse_due = false;
     }

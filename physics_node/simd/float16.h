@@ -20,6 +20,7 @@ struct F16 {
   static F16 All(float s) { return {_mm512_set1_ps(s)}; }
   /// Sixteen successive floats, aligned to 32 bytes as for F8.
   static F16 Load(const float* p) { return {_mm512_loadu_ps(p)}; }
+  static F16 LoadAny(const float* p) { return Load(p); }
   void Store(float* p) const { _mm512_storeu_ps(p, v); }
   static F16 Halves(F8 lo, F8 hi) {
     return {_mm512_castpd_ps(

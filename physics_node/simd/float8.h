@@ -14,9 +14,12 @@ struct F8 {
   static constexpr int kBatches = 1;
   __m256 v;
   static F8 Load(const float* p) { return {_mm256_load_ps(p)}; }
+  /// At any address.
+  static F8 LoadAny(const float* p) { return {_mm256_loadu_ps(p)}; }
   static F8 All(float s) { return {_mm256_set1_ps(s)}; }
   static F8 Halves(__m128 lo, __m128 hi) { return {_mm256_set_m128(hi, lo)}; }
   void Store(float* p) const { _mm256_store_ps(p, v); }
+  void StoreAny(float* p) const { _mm256_storeu_ps(p, v); }
   [[nodiscard]] __m128 lo() const { return _mm256_castps256_ps128(v); }
   [[nodiscard]] __m128 hi() const { return _mm256_extractf128_ps(v, 1); }
 };
@@ -44,11 +47,16 @@ struct F8 {
   static constexpr int kBatches = 1;
   __m128 l, h;
   static F8 Load(const float* p) { return {_mm_load_ps(p), _mm_load_ps(p + 4)}; }
+  static F8 LoadAny(const float* p) { return {_mm_loadu_ps(p), _mm_loadu_ps(p + 4)}; }
   static F8 All(float s) { return {_mm_set1_ps(s), _mm_set1_ps(s)}; }
   static F8 Halves(__m128 lo, __m128 hi) { return {lo, hi}; }
   void Store(float* p) const {
     _mm_store_ps(p, l);
     _mm_store_ps(p + 4, h);
+  }
+  void StoreAny(float* p) const {
+    _mm_storeu_ps(p, l);
+    _mm_storeu_ps(p + 4, h);
   }
   [[nodiscard]] __m128 lo() const { return l; }
   [[nodiscard]] __m128 hi() const { return h; }

@@ -16,7 +16,9 @@ struct F8 {
     }
     return r;
   }
+  static F8 LoadAny(const float* p) { return Load(p); }
   static F8 All(float s) { return {{s, s, s, s, s, s, s, s}}; }
+  void StoreAny(float* p) const { Store(p); }
   void Store(float* p) const {
     for (int i = 0; i < 8; ++i) {
       p[i] = lane[i];
