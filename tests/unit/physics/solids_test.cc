@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <vector>
 
 #include "physics_node/energy/elastic_model.h"
 #include "physics_node/simulation/script_player.h"
@@ -154,6 +155,45 @@ TEST_F(OnSeveralSolids, PushOneAnotherAway) {
   EXPECT_GT(pressed, 0.001f);
   EXPECT_LT(deepest, 0.001f);
   EXPECT_EQ(simulation.quarantined(), 0u);
+}
+
+/// Their coarse nodes are off, those of the membrane and the organ are not.
+TEST_F(OnSeveralSolids, ThatNothingTouchesSleepWhileTheMembraneMovesAsWithoutThem) {
+  scene::SceneSettings settings = scene::Small();
+  settings.physics.gravity = Vec3f::Zero();
+  settings.physics.mode = PhysicsMode::kAccurate;
+  const scene::SceneData alone_data = scene::AssembleScene(settings, scene::ProceduralAnatomy(settings));
+  const SceneView alone_scene = alone_data.View();
+  TissueSimulation simulation(scene_), alone(alone_scene);
+  // A hook presses the membrane down and moves along it.
+  std::array<ToolInput, kMaxTools> tools{};
+  tools[1].present = true;
+  tools[1].pose.q_WT = Quatf(0, 1, 0, 0);
+  const Vec3f middle =
+      alone_scene.rest_position[alone_scene.membrane.first + alone_scene.membrane.rows / 2 * alone_scene.membrane.cols +
+                                alone_scene.membrane.cols / 2];
+  const auto others = [&] {
+    std::vector<Vec3f> places;
+    for (Index v = scene_.solids[kPad].first_vertex; v < scene_.tube_vertex_count; ++v) {
+      places.push_back(At(simulation, v));
+    }
+    return places;
+  };
+  std::vector<Vec3f> before;
+  for (int i = 0; i < 120; ++i) {
+    tools[1].pose.p_WT = middle + Vec3f(0, 0.0001f * static_cast<float>(i), 0.004f - 0.0001f * static_cast<float>(i));
+    simulation.Step(tools);
+    alone.Step(tools);
+    if (i == 70) before = others();
+  }
+  EXPECT_GT(alone.MaxDisplacement(), 0.002f);
+  EXPECT_EQ(others(), before);
+  EXPECT_LT(simulation.awake_part(), 0.9f);
+  for (Index node = 0; node < alone_scene.membrane.rows * alone_scene.membrane.cols; ++node) {
+    const Vec3f there = At(simulation, scene_.membrane.first + node);
+    const Vec3f here = At(alone, alone_scene.membrane.first + node);
+    ASSERT_LT((there - here).norm(), 1e-4f) << node;
+  }
 }
 
 TEST_F(UnderGravity, AreTheSameOnAnyNumberOfThreads) {
