@@ -2,8 +2,11 @@
 //
 //   small_rtt              HandleState (56 B) there, CauteryContact (84 B) back, at 1 kHz over UDP loopback; both
 //                          sides take and write in the callback.
-//   frame_300k             TissueFrame filled to its capacity at 100 Hz, from the call of WriteInPlace to the callback
-//                          in the other process; frame_300k_take: until the node has the checked copy.
+//   frame_25600            TissueFrame of 25,600 vertices at 100 Hz, from the call of WriteInPlace to the callback in
+//   the
+//                          other process; frame_25600_take: until the node has the checked copy.
+//   body                   bytes of a TissueFrame with the vertices of the built-in scene (x1), three and ten times as
+//                          many, the time to pack and unpack it, and by how much a coordinate is off.
 //   take                   cost in the thread of a node's tick: TakeLatest without a new sample, and with the ten
 //                          ToolStates that arrive in a period of 100 Hz.
 //   start_to_first_sample  from fork to the first ToolState of a running publisher in the new process.
@@ -16,12 +19,14 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "services/transport/bus/convert/cdr.h"
 #include "services/transport/bus/dds/participant.h"
 #include "services/transport/bus/dds/shared_memory.h"
 #include "services/transport/bus/input_account.h"
@@ -204,10 +209,49 @@ void Frames(benchmark::Report* report) {
     called_us.push_back(Us(called));
     taken_us.push_back(Us(taken));
   }
-  AddQuantiles(report, "bus.frame_300k", called_us);
-  AddQuantiles(report, "bus.frame_300k_take", taken_us);
-  AddQuantiles(report, "bus.frame_300k_write", write_us);
-  report->Add("bus.frame_300k_lost", static_cast<double>(count) - static_cast<double>(called_us.size()), "samples");
+  AddQuantiles(report, "bus.frame_25600", called_us);
+  AddQuantiles(report, "bus.frame_25600_take", taken_us);
+  AddQuantiles(report, "bus.frame_25600_write", write_us);
+  report->Add("bus.frame_25600_lost", static_cast<double>(count) - static_cast<double>(called_us.size()), "samples");
+}
+
+/// A crumpled sheet of 69 mm.
+std::vector<float> Sheet(int vertices) {
+  const int cols = static_cast<int>(std::sqrt(vertices / 3.0));
+  std::vector<float> xyz;
+  for (int v = 0; v < vertices; ++v) {
+    const double s = 0.069 * (v % cols) / cols, t = 0.2 * (v / cols) * cols / vertices;
+    for (const double x : {s, t, 0.02 * std::sin(150 * s) * std::cos(80 * t)}) xyz.push_back(static_cast<float>(x));
+  }
+  return xyz;
+}
+
+void Sizes(benchmark::Report* report) {
+  constexpr int kBuiltIn = 20560;
+  for (const int times : {1, 3, 10}) {
+    const std::string x = ".moving_x" + std::to_string(times);
+    TissueFrame frame, got;
+    frame.xyz = Sheet(times * kBuiltIn);
+    frame.header.vertex_count = static_cast<std::uint32_t>(times * kBuiltIn);
+    std::vector<std::uint8_t> bytes;
+    std::vector<double> pack_us, unpack_us;
+    for (int i = 0; i < (report->quick() ? 5 : 50); ++i) {
+      const std::int64_t start_ns = NowNs();
+      if (!EncodeCdr(frame, &bytes)) return;
+      const std::int64_t packed_ns = NowNs();
+      if (!DecodeCdr(bytes, &got)) return;
+      pack_us.push_back(Us(packed_ns - start_ns));
+      unpack_us.push_back(Us(NowNs() - packed_ns));
+    }
+    double off_m = 0;
+    for (std::size_t i = 0; i < frame.xyz.size(); ++i) {
+      off_m = std::max(off_m, std::abs(static_cast<double>(got.xyz[i]) - static_cast<double>(frame.xyz[i])));
+    }
+    report->Add("body.frame_kB" + x, 1e-3 * static_cast<double>(bytes.size()), "kB");
+    AddQuantiles(report, "body.frame_pack" + x, pack_us);
+    AddQuantiles(report, "body.frame_unpack" + x, unpack_us);
+    report->Add("body.quantisation_um_max" + x, 1e6 * off_m, "um");
+  }
 }
 
 void Take(benchmark::Report* report) {
@@ -275,8 +319,9 @@ int Main(int argc, char** argv) {
   }
   benchmark::Report report(argc, argv);
   if (report.Wants("bus.small_rtt")) SmallRoundTrip(&report);
-  if (report.Wants("bus.frame_300k")) Frames(&report);
+  if (report.Wants("bus.frame_25600")) Frames(&report);
   if (report.Wants("bus.take")) Take(&report);
+  if (report.Wants("body.frame")) Sizes(&report);
   if (report.Wants("bus.start_to_first_sample")) Start(&report);
   RemoveSharedMemory(SharedMemoryDirectory(kDomain));
   return 0;
