@@ -11,8 +11,8 @@ namespace {
 
 /// Speed limit of the prediction [m/s], and over that of the fastest tool: what a tool pulls follows it; what snaps
 /// back or flaps beside a cut does not carry the error of one truncated solve into the next. Where a velocity exceeds
-/// the limit, the prediction is compared in energy with the present position (deploy/docs/measurements/physics,
-/// Prediction).
+/// the first, however fast the tools are, the prediction is compared in energy with the present position: a tool does
+/// not pull all that moves (deploy/docs/measurements/physics, Prediction).
 constexpr float kPredictedSpeed_m_s = 0.08f, kOverFastestTool = 1.5f;
 /// No particle is faster [m/s]: ten times a quick hand.
 constexpr float kLargestSpeed_m_s = 5.0f;
@@ -286,8 +286,10 @@ std::uint32_t Predict(const SolverContext& context, const Inertia& inertia, cons
     ResetDamagedVelocities(&state->velocity);
   }
   PredictConstrained(context, boundary, state);
-  // Beyond the limit a prediction may have more energy than the present positions; the better of both is taken.
-  if (count.largest_sq > limit * limit) {
+  // A fast prediction may have more energy than the present positions: beside nodes that are predicted in place it
+  // stretches edges, and the limited correction would not undo that. The better of both is taken.
+  const float doubtful = kPredictedSpeed_m_s * inertia.h;
+  if (count.largest_sq > doubtful * doubtful) {
     const auto energy = [&] {
       return EnergyAt(context, state->linearisation.point, inertia, boundary.contacts, state, scratch);
     };

@@ -1,5 +1,5 @@
-// Ten thousand random grasps, cuts and releases on one organ, five thousand on several solids; half with a grasper and
-// a hook, half with two graspers.
+// Ten thousand random grasps, cuts and releases on one organ, as many on several solids; half with a grasper and a
+// hook, half with two graspers.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -36,7 +36,8 @@ TEST_P(GraspCutSoak, FiveThousandOperations) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, GraspCutSoak,
-                         testing::Values(std::pair{11u, false}, std::pair{12u, false}, std::pair{13u, true}));
+                         testing::Values(std::pair{11u, false}, std::pair{12u, false}, std::pair{13u, true},
+                                         std::pair{14u, true}));
 
 }  // namespace
 }  // namespace fulcrum::physics
