@@ -45,6 +45,9 @@ bool SearchAlongCorrection(const SolverContext& context, const Inertia& inertia,
   const FloatArray& point = state->linearisation.point;
   FloatArray &d = scratch->krylov.d, &trial = scratch->krylov.q;
   const double before = EnergyAt(context, point, inertia, contacts, state, scratch);
+  // Elements and contacts of what is computed also join particles that are not.
+  const bool part = !state->regions.all_computed();
+  if (part) std::copy_n(point.data(), layout.tube_floats + 3 * layout.plane, trial.data());
   for (int halving = 0;; ++halving) {
     ForTasks(&context.workers, state->regions.computed(), [&](const Task& task, int, int) {
       ForPieces(layout, task, [&](std::size_t first, std::size_t count) {
@@ -54,6 +57,7 @@ bool SearchAlongCorrection(const SolverContext& context, const Inertia& inertia,
       });
     });
     if (EnergyAt(context, trial, inertia, contacts, state, scratch) <= before || halving == kHalvings) {
+      if (part) std::fill_n(trial.data(), layout.tube_floats + 3 * layout.plane, 0.0f);
       return halving > 0;
     }
     for (std::size_t i = 0; i < layout.tube_floats + 3 * layout.plane; ++i) {

@@ -43,6 +43,15 @@ void MeasureMovement(const ParticleStore& particles, const Task& task, std::vect
   }
 }
 
+/// A task without the vertices of its first and last block that another task has, too.
+Task WholeBlocks(const Task& task, Index tube_count) {
+  if (task.sheet) return task;
+  constexpr int kBlock = static_cast<int>(ParticleStore::kBlockVertices);
+  const int first = (task.first + kBlock - 1) / kBlock * kBlock;
+  const int end = task.end == static_cast<int>(tube_count) ? task.end : task.end / kBlock * kBlock;
+  return {false, first, std::max(first, end)};
+}
+
 /// Wakes the regions in which held particles and contacts begin, move or end. `now` is memory.
 void WakeTouched(const SolverContext& context, const BoundaryConditions& boundary, TouchedRegions* now,
                  TouchedRegions* last, Regions* regions) {
@@ -54,8 +63,16 @@ void WakeTouched(const SolverContext& context, const BoundaryConditions& boundar
   }
   for (const ContactRow& row : boundary.contacts) {
     if (row.normal.dot(row.At(context.particles.pool())) < row.offset) {
-      const std::uint8_t how = row.drift.squaredNorm() > 0.0f ? kTouchedByMoving : kTouched;
-      for (std::size_t k = 0; k < static_cast<std::size_t>(row.count); ++k) {
+      const auto count = static_cast<std::size_t>(row.count);
+      const int body = partition.BodyOf(partition.Of(row.at[0]));
+      bool pressed = row.drift.squaredNorm() > 0.0f;  // By something that moves.
+      for (std::size_t k = 1; k < count && !pressed; ++k) {
+        pressed = partition.BodyOf(partition.Of(row.at[k])) != body &&
+                  std::any_of(row.at.begin(), row.at.begin() + static_cast<std::ptrdiff_t>(count),
+                              [&](ParticleRef at) { return regions->moving(partition.Of(at)); });
+      }
+      const std::uint8_t how = pressed ? kTouchedByMoving : kTouched;
+      for (std::size_t k = 0; k < count; ++k) {
         std::uint8_t& touched = now->touched[static_cast<std::size_t>(partition.Of(row.at[k]))];
         touched = std::max(touched, how);
       }
@@ -180,8 +197,14 @@ std::uint32_t ImplicitSolver::BeginStep() {
   Movement& movement = state_.movement;
   movement.of_step.swap(movement.before_sleep);
   std::fill(movement.before_sleep.begin(), movement.before_sleep.end(), 0.0f);
+  // A block in which two solids meet is measured here: two tasks would write its movement.
+  for (const Index block : model_.partition.split_blocks()) {
+    const Index first = block * ParticleStore::kBlockVertices;
+    particles.MeasureTube(first, std::min(first + ParticleStore::kBlockVertices, particles.tube_count()),
+                          movement.of_step.data());
+  }
   ForTasks(&workers_, state_.regions.computed(), [&](const Task& task, int, int) {
-    MeasureMovement(particles, task, &movement.of_step);
+    MeasureMovement(particles, WholeBlocks(task, particles.tube_count()), &movement.of_step);
     ForPieces(model_.layout, task,
               [&](std::size_t first, std::size_t count) { particles.StorePositions(first, count); });
   });

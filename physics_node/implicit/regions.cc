@@ -24,8 +24,9 @@ Partition::Partition(const ParticleStore& particles, std::span<const std::pair<P
   body_.assign(static_cast<std::size_t>(sheet_regions_), 0);
   for (std::uint32_t v = 0; v < tube_count_; ++v) {
     const int body = static_cast<int>(solid[v]);
-    const bool full = !first_vertex_.empty() && static_cast<int>(v) - first_vertex_.back() == kVertices;
-    if (first_vertex_.empty() || full || body != body_.back()) {
+    const bool new_solid = first_vertex_.empty() || body != body_.back();
+    if (new_solid && v % ParticleStore::kBlockVertices != 0) split_blocks_.push_back(particles.BlockOf(v));
+    if (new_solid || v % kVertices == 0) {
       first_vertex_.push_back(static_cast<int>(v));
       body_.push_back(body);
     }
@@ -123,6 +124,7 @@ void Partition::FindTasks(RegionSet* set) const {
 Regions::Regions(const Partition& partition) : partition_(partition), computed_(partition.MakeSet()) {
   const auto size = static_cast<std::size_t>(partition.count());
   awake_.assign(size, 1);
+  moving_.assign(size, 0);
   still_s_.assign(size, 0.0f);
   removed_.reserve(size);
   bodies_.resize(static_cast<std::size_t>(partition.body_count()));
@@ -163,7 +165,8 @@ void Regions::UpdateSleep(std::span<const float> speed, float h) {
     }
   }
   for (std::size_t i = 0; i < awake_.size(); ++i) {
-    if (speed[i] >= kStillSpeed_m_s) {
+    moving_[i] = speed[i] >= kStillSpeed_m_s ? 1 : 0;
+    if (moving_[i] != 0) {
       Wake(static_cast<int>(i));
       for (const int neighbour : partition_.neighbours(static_cast<int>(i))) {
         Wake(neighbour);

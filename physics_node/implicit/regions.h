@@ -49,6 +49,8 @@ class Partition {
   }
   /// The body of a region: 0 the membrane with the organ, to which it is bound, 1 and so on the other solids.
   [[nodiscard]] int BodyOf(int region) const { return body_[static_cast<std::size_t>(region)]; }
+  /// Blocks of ParticleStore with vertices of two solids: two regions share them.
+  [[nodiscard]] std::span<const Index> split_blocks() const { return split_blocks_; }
   [[nodiscard]] int body_count() const { return body_.empty() ? 0 : body_.back() + 1; }
   /// Rows or vertices of a region.
   [[nodiscard]] Task Extent(int region) const;
@@ -72,6 +74,7 @@ class Partition {
   std::uint32_t tube_floats_, stride_, tube_count_, rows_, cols_;
   int sheet_regions_ = 0;
   std::vector<int> region_of_vertex_;
+  std::vector<Index> split_blocks_;
   std::vector<int> first_vertex_;             ///< By region of the organ, and the number of vertices.
   std::vector<int> body_;                     ///< By region, ascending.
   std::vector<std::vector<int>> neighbours_;  ///< By region.
@@ -100,6 +103,9 @@ class Regions {
   /// Part of all particles that is awake, also while all are computed.
   [[nodiscard]] float awake_part() const;
 
+  /// It was faster than kStillSpeed_m_s at the last UpdateSleep.
+  [[nodiscard]] bool moving(int region) const { return moving_[static_cast<std::size_t>(region)] != 0; }
+
   /// Keeps awake, or wakes; in force after the next Rebuild.
   void Wake(int region);
   void WakeAll();
@@ -117,7 +123,7 @@ class Regions {
 
  private:
   const Partition& partition_;
-  std::vector<std::uint8_t> awake_;
+  std::vector<std::uint8_t> awake_, moving_;
   std::vector<float> still_s_;  ///< By region: since when it has been still [s].
   RegionSet computed_;
   std::vector<int> removed_;

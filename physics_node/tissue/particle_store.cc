@@ -3,10 +3,10 @@
 namespace fulcrum::physics {
 
 void ParticleStore::MeasureTube(Index first, Index end, float* moved) const {
-  for (Index block = first / kBlockVertices; first < end; ++block, first += kBlockVertices) {
+  for (Index block = first / kBlockVertices, last = 0; first < end; ++block, first = last) {
     // The largest change per axis: its norm is an upper bound of the distances. Lane 3 holds w, which is constant here.
     float largest[4] = {0, 0, 0, 0};
-    const Index last = std::min(first + kBlockVertices, end);
+    last = std::min((block + 1) * kBlockVertices, end);
     for (std::size_t i = 4 * std::size_t{first}; i < 4 * std::size_t{last}; i += 4) {
       for (std::size_t axis = 0; axis < 4; ++axis) {
         const float d = std::abs(now_[i + axis] - previous_[i + axis]);

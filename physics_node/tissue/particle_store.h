@@ -172,7 +172,7 @@ class ParticleStore {
     return tube_blocks() + node / layout_.cols * kBlocksPerRow + lane * kBlocksPerRow / kLanes;
   }
   /// Raises moved[b] to an upper bound of the distance of the block's particles from their previous positions [m], for
-  /// the blocks of tube vertices [first, end), where `first` begins a block, or of membrane rows [first, end).
+  /// the blocks of tube vertices [first, end) or of membrane rows [first, end).
   void MeasureTube(Index first, Index end, float* moved) const;
   void MeasureRows(std::uint32_t first, std::uint32_t end, float* moved) const;
   /// The same for all blocks, starting from 0.
