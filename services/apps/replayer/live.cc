@@ -75,16 +75,36 @@ bool IsSent(TopicId topic, const std::vector<NodeId>& nodes) {
 
 }  // namespace
 
+namespace {
+
+/// Vertices of the recording's frames: by UDP, on an encrypted bus, a sample has the size of the writer's type.
+int TissueVertices(const std::filesystem::path& file) {
+  recording::McapReader reader(file);
+  recording::McapMessage message{};
+  TissueFrame frame;
+  while (reader.Next(&message)) {
+    const bus::TopicRole* role = bus::RoleNamed(reader.channels().at(message.channel).topic);
+    if (role != nullptr && role->id == TopicId::kTissueFrame && bus::DecodeCdr(message.data, &frame)) {
+      return static_cast<int>(frame.header.vertex_count);
+    }
+  }
+  return kMaxTissueVertices;
+}
+
+}  // namespace
+
 LiveResult ReplayLive(const LiveSettings& settings, const std::function<bool()>& stop) {
   recording::TimeOrder messages(settings.recording);
   const recording::McapReader& reader = messages.reader();
   const std::filesystem::path memory = bus::SharedMemoryDirectory(settings.domain);
   const bus::Security security =
       settings.security.on() ? settings.security : bus::AnnouncedSecurity(memory, bus::kReplayerIdentity);
-  bus::DdsParticipant participant({.domain = settings.domain,
-                                   .node_name = std::string(bus::kReplayerIdentity),
-                                   .shared_memory = memory,
-                                   .security = security});
+  bus::DdsParticipant participant(
+      {.domain = settings.domain,
+       .node_name = std::string(bus::kReplayerIdentity),
+       .shared_memory = memory,
+       .security = security,
+       .tissue_vertices = security.encrypt ? TissueVertices(settings.recording) : kMaxTissueVertices});
   std::map<TopicId, std::unique_ptr<Channel>> channels;
   for (const bus::TopicRole& role : bus::kTopicRoles) {
     if (!IsSent(role.id, settings.nodes)) continue;

@@ -79,20 +79,21 @@ void Unpack(const TissueBlock& block, BlockSteps* steps) {
 }
 
 bool IsCanonical(const TissueBlock& block) {
+  const bool near = std::ranges::all_of(block.origin, [](std::int32_t origin) {
+    return origin >= -kMostSteps && origin <= kMostSteps - static_cast<std::int32_t>(kMostOffset);
+  });
+  if (!near || block.shift > kMostBlockShift) return false;
   if (block.shift != 0) {
-    if (block.shift > kMostBlockShift) return false;
     BlockSteps steps;
     Unpack(block, &steps);
-    return Pack(steps) == block;
+    return std::ranges::all_of(steps, [](std::int32_t x) { return x >= -kMostSteps && x <= kMostSteps; }) &&
+           Pack(steps) == block;
   }
   std::array<std::uint16_t, 3> low{block.offset[0], block.offset[1], block.offset[2]};
   for (std::size_t i = 3; i < block.offset.size(); i += 3) {
     for (std::size_t k = 0; k < 3; ++k) low[k] = std::min(low[k], block.offset[i + k]);
   }
-  const bool wraps = std::ranges::any_of(block.origin, [](std::int32_t origin) {
-    return origin > std::numeric_limits<std::int32_t>::max() - static_cast<std::int32_t>(kMostOffset);
-  });
-  return (low[0] | low[1] | low[2]) == 0 && !wraps;
+  return (low[0] | low[1] | low[2]) == 0;
 }
 
 bool PackPositions(std::span<const float> xyz, std::byte* blocks) {

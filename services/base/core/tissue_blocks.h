@@ -39,11 +39,14 @@ inline constexpr std::uint32_t kMostBlockShift = 15;
   return static_cast<float>(kTissueStep_m * static_cast<double>(steps));
 }
 
-/// @param steps of at most 2^30 in magnitude.
+/// Largest coordinate of a block [steps].
+inline constexpr std::int32_t kMostSteps = 1 << 30;
+
+/// @param steps of at most kMostSteps in magnitude.
 [[nodiscard]] TissueBlock Pack(const BlockSteps& steps);
 /// Of any bytes: the result is modulo 2^32, and only the low four bits of the shift count.
 void Unpack(const TissueBlock& block, BlockSteps* steps);
-/// Whether Pack makes this block of its steps.
+/// Whether Pack makes this block of steps of at most kMostSteps.
 [[nodiscard]] bool IsCanonical(const TissueBlock& block);
 
 /// Rounds and packs positions [m], x y z interleaved. Vertices after the last one repeat it. False if a coordinate is

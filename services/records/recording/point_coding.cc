@@ -160,6 +160,14 @@ bool PointCoder::Decode(std::span<const std::uint8_t> coded, std::vector<std::ui
     const std::uint32_t moved = kind == kDifference || i < kPoint ? 0 : words_[i - kPoint] - last_[i - kPoint];
     words_[i] = last_[i] + moved + static_cast<std::uint32_t>(Unzigzag(residuals_[i]));
   }
+  const bool near = std::ranges::all_of(words_, [](std::uint32_t word) {
+    const auto steps = static_cast<std::int32_t>(word);
+    return steps >= -kMostSteps && steps <= kMostSteps;
+  });
+  if (!near) {
+    Restart();
+    return false;
+  }
   PutBlocks(head, message);
   last_.swap(words_);
   return true;

@@ -15,7 +15,7 @@ namespace fulcrum::bus {
 
 enum class Path : std::uint8_t {
   kLoopback,      ///< UDP on 127.0.0.1, serialised.
-  kSharedMemory,  ///< Data-sharing with loans: plain types, at most 100 Hz.
+  kSharedMemory,  ///< Data-sharing with loans, at most 100 Hz.
 };
 
 enum class Delivery : std::uint8_t {

@@ -3,8 +3,7 @@
 //   small_rtt              HandleState (56 B) there, CauteryContact (84 B) back, at 1 kHz over UDP loopback; both
 //                          sides take and write in the callback.
 //   frame_25600            TissueFrame of 25,600 vertices at 100 Hz, from the call of WriteInPlace to the callback in
-//   the
-//                          other process; frame_25600_take: until the node has the checked copy.
+//                          the other process; frame_25600_take: until the node has the checked copy.
 //   body                   bytes of a TissueFrame with the vertices of the built-in scene (x1), three and ten times as
 //                          many, the time to pack and unpack it, and by how much a coordinate is off.
 //   take                   cost in the thread of a node's tick: TakeLatest without a new sample, and with the ten

@@ -86,7 +86,7 @@ void Apply(const Quality& quality, int depth, const std::string& shared_memory, 
   qos->history().kind = fast::KEEP_LAST_HISTORY_QOS;
   qos->history().depth = depth;
   // The pool has this many samples of the type's full size: one more than the history, for the sample being written.
-  // The library's default of 5000 would reserve 1.5 GB per large topic.
+  // The library's default of 5000 would reserve gigabytes per large topic.
   const int samples = depth + 1;
   qos->resource_limits().max_instances = 1;
   qos->resource_limits().max_samples = samples;
@@ -252,8 +252,14 @@ std::unique_ptr<Input<T>> DdsParticipant::MakeInput(std::function<void()> notify
   Apply(role.quality, role.quality.reader_depth, impl_->SharedMemoryFor(role), &qos);
   qos.reliable_reader_qos().times.initialAcknackDelay = kFirstAcknack;
   const WorkingIn here(impl_->shared_memory);
-  auto port = std::make_unique<dds::DdsInput<T>>(impl_->subscriber, impl_->TopicFor<T>(), qos, std::move(notify),
-                                                 &impl_->session);
+  std::unique_ptr<dds::DdsInput<T>> port;
+  if constexpr (Loanable<T>) {
+    port = std::make_unique<dds::DdsInput<T>>(impl_->loan_B<T>(), impl_->subscriber, impl_->TopicFor<T>(), qos,
+                                              std::move(notify), &impl_->session);
+  } else {
+    port = std::make_unique<dds::DdsInput<T>>(impl_->subscriber, impl_->TopicFor<T>(), qos, std::move(notify),
+                                              &impl_->session);
+  }
   if (!port->ok()) throw InputError(impl_->CannotMake(role, "reader"));
   if (role.quality.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
   return port;

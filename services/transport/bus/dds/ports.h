@@ -161,7 +161,10 @@ class DdsInput final : public InputBase<T> {
 template <Loanable T>
 class DdsInput<T> final : public InputBase<T> {
  public:
-  using InputBase<T>::InputBase;
+  /// @param loan_B size of the topic's type in this participant.
+  DdsInput(std::size_t loan_B, fast::Subscriber* subscriber, fast::Topic* topic, const fast::DataReaderQos& qos,
+           std::function<void()> notify, SessionCheck* check)
+      : InputBase<T>(subscriber, topic, qos, std::move(notify), check), loan_B_(loan_B) {}
 
   bool TakeLatest(T* sample) override { return Take(kQualityOf<T>.reader_depth, sample); }
   bool TakeNext(T* sample) override { return Take(1, sample); }
@@ -183,10 +186,9 @@ class DdsInput<T> final : public InputBase<T> {
 
   bool Choose(T* sample) {
     auto* const* data = loans_.buffer();
-    // Of the largest message: the library does not say how large the writer's pool is. A writer's count of vertices is
-    // that of its pool at most (CloseLoan).
-    static const std::size_t loan_B = LoanBytes(sample, kMaxTissueVertices);
-    const auto loan = [data](int i) { return std::span(reinterpret_cast<const std::byte*>(data[i]), loan_B); };
+    // The library does not say how large a sample is. By UDP it has the size of this participant's type; in shared
+    // memory that of its writer's, which has checked that the content fits (CloseLoan).
+    const auto loan = [this, data](int i) { return std::span(reinterpret_cast<const std::byte*>(data[i]), loan_B_); };
     for (int i = static_cast<int>(infos_.length()) - 1; i >= 0; --i) {
       if (!infos_[i].valid_data) continue;
       const std::uint64_t session = SessionOf(loan(i));
@@ -210,6 +212,7 @@ class DdsInput<T> final : public InputBase<T> {
     return false;
   }
 
+  const std::size_t loan_B_;
   fast::LoanableSequence<std::byte> loans_;
   fast::SampleInfoSeq infos_;
   T candidate_;

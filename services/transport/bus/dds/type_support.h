@@ -51,7 +51,7 @@ class LoanType final : public eprosima::fastdds::dds::TopicDataType {
   [[nodiscard]] std::size_t loan_B() const { return loan_B_; }
 
   bool serialize(void*, eprosima::fastrtps::rtps::SerializedPayload_t*) override { return false; }
-  /// As with CheckedType, what is cut short becomes a message that no gate accepts.
+  /// For samples that are taken as copies. What is cut short becomes a message that no gate accepts.
   bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
     const std::span loan(static_cast<std::byte*>(data), loan_B_);
     const std::size_t head_B = std::min<std::size_t>(payload->length, kEncapsulation_B);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "services/base/core/messages.h"
+#include "services/base/core/tissue_blocks.h"
 #include "services/transport/link/codec/chunk_book.h"
 
 namespace fulcrum::link {
@@ -18,13 +19,11 @@ namespace fulcrum::link {
 /// Largest message on the wire [B]: fits an Ethernet frame of 1500 B with the headers of IP, UDP and RTPS, encrypted.
 inline constexpr std::size_t kChunk_B = 1280;
 
-/// Resolution of the encoded positions [m].
-inline constexpr double kTissueStep_m = 5e-6;
 /// Distance along any axis between a vertex and its last sent position beyond which the vertex is sent again [steps].
 /// Larger than one half, so that noise about the middle between two steps causes no traffic.
 inline constexpr double kTissueSlack = 0.75;
-/// Largest error of a position without losses: sqrt(3) * kTissueSlack * kTissueStep_m, and the rounding of a float at
-/// 10 m [m].
+/// Largest error of a position without losses, against any position: sqrt(3) * kTissueSlack * kTissueStep_m, and the
+/// rounding of a float at 10 m [m]. A frame of the bus has whole steps already, to which this adds nothing.
 inline constexpr double kTissueError_m = 7.5e-6;
 /// Vertices per block; neighbours in scene order lie close together.
 inline constexpr std::uint32_t kTissueBlock = 32;
