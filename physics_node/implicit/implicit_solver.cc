@@ -221,6 +221,9 @@ SubstepReport ImplicitSolver::Substep(float h, int iterations, std::span<const H
   const Inertia inertia = model_.InertiaOf(h);
   const BoundaryConditions boundary{held, contacts};
   WakeTouched(context_, boundary, &scratch_.touched, &state_.touched, &state_.regions);
+  // A fold that opens slowly is no rest.
+  state_.elements.guard().ForVerticesFound(
+      [this](Index v) { state_.regions.Wake(model_.partition.At(false, static_cast<int>(v))); });
   if (state_.regions.Rebuild()) {
     FollowComputedRegions(context_, &state_, &scratch_.krylov);
   }

@@ -64,7 +64,7 @@ void InversionGuard::Scan(const float* place) {
     const Vertices& v = tets_[next_];
     const Vec3f x0 = At(place, v[0]);
     const float volume = (At(place, v[1]) - x0).cross(At(place, v[2]) - x0).dot(At(place, v[3]) - x0);
-    if (volume < 0.0f &&
+    if (volume <= 0.0f &&
         std::none_of(found_.begin(), found_.end(), [&](const Found& found) { return found.tet == next_; })) {
       found_.emplace_back().tet = next_;
     }

@@ -12,6 +12,7 @@
 // nothing.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -28,6 +29,11 @@ class InversionGuard {
   void Linearise(const float* place);
   /// Some tetrahedra are guarded.
   [[nodiscard]] bool folded() const { return !found_.empty(); }
+  /// body(vertex) for the vertices of the tetrahedra found.
+  template <class Body>
+  void ForVerticesFound(const Body& body) const {
+    for (const Found& found : found_) std::for_each(tets_[found.tet].begin(), tets_[found.tet].end(), body);
+  }
   /// body(vertex, stiffness [N/m]): what the guarded tetrahedra add to the diagonal, a vertex perhaps several times.
   template <class Body>
   void ForDiagonal(const Body& body) const;
