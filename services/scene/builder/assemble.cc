@@ -74,8 +74,8 @@ void CheckCounts(const SceneSettings& settings, const Anatomy& anatomy) {
     Refuse(settings, "the membrane needs at least 3 x 3 nodes");
   }
   if (!settings.any_size && (total > kMaxTissueVertices || anatomy.sheet.size() > kMaxMembraneNodes)) {
-    // All processes of a session: 350 MB with 20,000 vertices, 810 MB with 205,000.
-    const std::size_t memory_MB = 300 + total / 400;
+    // Physics, heat, haptics, picture and supervisor together: 350 MB with 20,560 vertices, 845 MB with 204,972.
+    const std::size_t memory_MB = 295 + total / 373;
     Refuse(settings, std::to_string(total) + " vertices (" + std::to_string(anatomy.sheet.size()) +
                          " of them in the membrane), for which a session would need " + std::to_string(memory_MB) +
                          " MB; valid: at most " + std::to_string(kMaxTissueVertices) +

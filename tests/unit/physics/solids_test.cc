@@ -157,7 +157,7 @@ TEST_F(OnSeveralSolids, PushOneAnotherAway) {
   EXPECT_EQ(simulation.quarantined(), 0u);
 }
 
-/// The pad sleeps under a load at rest. What presses it touches the same regions when it moves again.
+/// A pad on which a pressed lump has come to rest yields again when the lump is pressed further.
 TEST_F(OnSeveralSolids, WakeWhenWhatLiesOnThemMovesAgain) {
   TissueSimulation simulation(scene_);
   std::array<ToolInput, kMaxTools> tools{};

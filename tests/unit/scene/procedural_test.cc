@@ -327,7 +327,7 @@ TEST(SceneBuild, RefusesWhatDoesNotFit) {
   SceneSettings many = Small();
   many.membrane.rows = 4001;
   many.membrane.cols = 64;
-  EXPECT_NE(Refusal(many).find("would need 940 MB; valid: at most 250000."), std::string::npos) << Refusal(many);
+  EXPECT_NE(Refusal(many).find("would need 982 MB; valid: at most 250000."), std::string::npos) << Refusal(many);
   SceneSettings wide = Small();
   wide.tube.length_m = 0.45;
   EXPECT_NE(Refusal(wide).find("the atlas"), std::string::npos) << Refusal(wide);
