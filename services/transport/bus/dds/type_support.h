@@ -48,7 +48,6 @@ class LoanType final : public eprosima::fastdds::dds::TopicDataType {
     auto_fill_type_object(false);
     auto_fill_type_information(false);
   }
-  [[nodiscard]] std::size_t loan_B() const { return loan_B_; }
 
   bool serialize(void*, eprosima::fastrtps::rtps::SerializedPayload_t*) override { return false; }
   /// For samples that are taken as copies. What is cut short becomes a message that no gate accepts.
