@@ -34,6 +34,9 @@ constexpr float kClearShare = 0.5f;
 /// Sides refer to the normal of a patch of this many nodes in each direction instead of that of a triangle: a triangle
 /// of crumpled membrane can turn over while the membrane does not.
 constexpr Index kPatchNodes = 3;
+/// Below this the kernel's distance and the difference of its two points are rounded too differently for their quotient
+/// to be a unit vector [m].
+constexpr float kRoundedDistance = 1e-5f;
 /// The side of a tool is determined only if its offset has at least this share along the normal, not beside an edge.
 constexpr float kSideCosine = 0.7f;
 /// Squared distances from here on mark triangles that the kernel skipped (kLargestFinite) [m^2].
@@ -386,7 +389,8 @@ ToolCollision::Push ToolCollision::PushOf(const ContactPair& pair, const Capsule
                ? Push{reach + distance, -side * pair.normal}
                : Push{};
   }
-  return distance > 0.0f ? Push{reach - distance, -offset / distance} : Push{};
+  const float length = distance < kRoundedDistance ? offset.norm() : distance;
+  return length > 0.0f ? Push{reach - distance, -offset / length} : Push{};
 }
 
 bool ToolCollision::any_touching() const {

@@ -16,8 +16,18 @@ void CoarseFactor::Triangle::Put(int row, const Block& block_of_row) {
   block.push_back(static_cast<std::uint32_t>(row));
 }
 
-CoarseFactor::CoarseFactor(std::vector<std::uint32_t> order)
-    : order_(std::move(order)), columns_((3 * static_cast<int>(order_.size()) + kFactorBlock - 1) / kFactorBlock) {
+CoarseFactor::CoarseFactor(std::vector<std::vector<std::uint32_t>> order) {
+  Eigen::Index size = 0;
+  for (std::vector<std::uint32_t>& nodes : order) {
+    for (const std::uint32_t node : nodes) {
+      for (int axis = 0; axis < 3; ++axis) row_.push_back(3 * static_cast<int>(node) + axis);
+    }
+    size += 3 * static_cast<Eigen::Index>(nodes.size());
+    while (row_.size() % kFactorBlock != 0) row_.push_back(-1);
+    const int end = static_cast<int>(row_.size()) / kFactorBlock;
+    groups_.push_back({std::move(nodes), columns_, end});
+    columns_ = end;
+  }
   const auto blocks = static_cast<std::size_t>(columns_);
   solution_ = FloatArray(kFactorBlock * blocks);
   making_ = FloatArray(kFactorBlockFloats * blocks * blocks);
@@ -27,31 +37,27 @@ CoarseFactor::CoarseFactor(std::vector<std::uint32_t> order)
     triangle->block.reserve(blocks * (blocks + 1) / 2);
     triangle->value = FloatArray(blocks * (blocks + 1) / 2 * kFactorBlockFloats);
   }
-  const auto size = static_cast<Eigen::Index>(3 * order_.size());
   (void)Take(KernelsFor(), Eigen::MatrixXf::Identity(size, size));  // In force until the first matrix is factored.
 }
 
-/// The lower part of a column of blocks of P A P^T, with ones on the diagonal beyond its last row.
+/// The lower part of a column of blocks of P A P^T, with ones on the diagonal where it has no row.
 void CoarseFactor::LoadColumn(const Eigen::MatrixXf& matrix, int column) {
-  const int size = 3 * static_cast<int>(order_.size());
   for (int row = column; row < columns_; ++row) {
     BlockAt(row, column).setZero();
   }
   for (int c = 0; c < kFactorBlock; ++c) {
     const int at = kFactorBlock * column + c;
-    if (at >= size) {
+    const int own = row_[static_cast<std::size_t>(at)];
+    if (own < 0) {
       BlockAt(column, column)(c, c) = 1.0f;
       continue;
     }
-    const auto number = [&](int i) {
-      return 3 * order_[static_cast<std::size_t>(i / 3)] + static_cast<unsigned>(i % 3);
-    };
-    const float* const from = matrix.data() + static_cast<std::size_t>(size) * number(at);
+    const float* const from = matrix.col(own).data();
     for (int row = column; row < columns_; ++row) {
       float* const to = BlockAt(row, column).col(c).data();
-      const int first = kFactorBlock * row, end = std::min(first + kFactorBlock, size);
-      for (int i = first; i < end; ++i) {
-        to[i - first] = from[number(i)];
+      const int* const number = row_.data() + static_cast<std::size_t>(kFactorBlock) * static_cast<std::size_t>(row);
+      for (int i = 0; i < kFactorBlock; ++i) {
+        if (number[i] >= 0) to[i] = from[number[i]];
       }
     }
   }
@@ -130,17 +136,35 @@ bool CoarseFactor::Take(const Kernels& kernels, const Eigen::MatrixXf& matrix) {
   return Continue(kernels, matrix, columns_) == Progress::kTaken;
 }
 
-void CoarseFactor::Solve(const Kernels& kernels, float* x) {
-  float* to = solution_.data();
-  for (const std::uint32_t node : order_) {
-    to = std::copy_n(x + kVertexFloats * node, 3, to);
+void CoarseFactor::Solve(const Kernels& kernels, float* x, std::span<const std::uint8_t> left_out) {
+  const auto taken = [&](std::size_t group) { return left_out.empty() || left_out[group] == 0; };
+  const auto part = [&](const Group& group) {
+    return solution_.data() + static_cast<std::size_t>(kFactorBlock) * static_cast<std::size_t>(group.first_column);
+  };
+  const auto substitute = [&](const Triangle& triangle, int first_step, const Group& group) {
+    Substitution steps = triangle.order();
+    steps.start += first_step;
+    steps.steps = group.end_column - group.first_column;
+    kernels.factor.substitute(steps, triangle.value.data(), solution_.data());
+  };
+  for (std::size_t i = 0; i < groups_.size(); ++i) {
+    if (!taken(i)) continue;
+    float* to = part(groups_[i]);
+    for (const std::uint32_t node : groups_[i].nodes) to = std::copy_n(x + kVertexFloats * node, 3, to);
   }
-  kernels.factor.substitute(down_.order(), down_.value.data(), solution_.data());
-  kernels.factor.substitute(up_.order(), up_.value.data(), solution_.data());
-  const float* from = solution_.data();
-  for (const std::uint32_t node : order_) {
-    std::copy_n(from, 3, x + kVertexFloats * node);
-    from += 3;
+  for (std::size_t i = 0; i < groups_.size(); ++i) {
+    if (taken(i)) substitute(down_, groups_[i].first_column, groups_[i]);
+  }
+  for (std::size_t i = groups_.size(); i-- > 0;) {
+    if (taken(i)) substitute(up_, columns_ - groups_[i].end_column, groups_[i]);
+  }
+  for (std::size_t i = 0; i < groups_.size(); ++i) {
+    if (!taken(i)) continue;
+    const float* from = part(groups_[i]);
+    for (const std::uint32_t node : groups_[i].nodes) {
+      std::copy_n(from, 3, x + kVertexFloats * node);
+      from += 3;
+    }
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "physics_node/implicit/kernels.h"
@@ -23,16 +24,20 @@ class CoarseFactor {
  public:
   enum class Progress { kMore, kTaken, kRefused };
 
-  /// `order`: the nodes in the order of elimination. With neighbours close together L is a band.
-  explicit CoarseFactor(std::vector<std::uint32_t> order = {});
+  /// `order`: the nodes in the order of elimination, by groups. With neighbours close together L is a
+  /// band. Each group begins with a column of blocks of its own, so a solve can leave it out.
+  explicit CoarseFactor(std::vector<std::vector<std::uint32_t>> order = {});
   /// Factors the next `columns` columns of blocks of `matrix`, symmetric, 3 rows per node, which must stay as it is
   /// from the first of them to the last. Then the factor is in force, and what follows begins anew. Refused as soon as
   /// the matrix turns out not to be positive definite: the last factor stays.
   Progress Continue(const Kernels& kernels, const Eigen::MatrixXf& matrix, int columns);
   /// All columns at once. False when refused.
   bool Take(const Kernels& kernels, const Eigen::MatrixXf& matrix);
-  /// x <- A^-1 x, xyz_ per node; the fourth stays.
-  void Solve(const Kernels& kernels, float* x);
+  /// x <- A^-1 x, xyz_ per node; the fourth stays. Groups marked in `left_out` (by group; empty: none) keep their x and
+  /// cost nothing: their columns of L and rows of L^T are left out of both substitutions. Where x of the first groups
+  /// is zero, that changes nothing for the others; otherwise they are solved as if a group before them, that is joined
+  /// to them, did not move, which is still symmetric and positive definite.
+  void Solve(const Kernels& kernels, float* x, std::span<const std::uint8_t> left_out = {});
   /// Columns of blocks.
   [[nodiscard]] int columns() const { return columns_; }
   /// Blocks of L that are kept.
@@ -60,7 +65,12 @@ class CoarseFactor {
   bool FactorColumn(const Kernels& kernels, int column);
   void PackTransposed();
 
-  std::vector<std::uint32_t> order_;
+  struct Group {
+    std::vector<std::uint32_t> nodes;
+    int first_column = 0, end_column = 0;
+  };
+  std::vector<Group> groups_;
+  std::vector<int> row_;  ///< By row of P A P^T: that of A, -1 between two groups.
   int columns_ = 0;
   Triangle down_, up_;  ///< In force.
   FloatArray solution_;

@@ -90,7 +90,11 @@ void CoarseSpace::ScaleHats(const Sheet& sheet) {
 
 void CoarseSpace::UpdateRegions(const Regions& regions) {
   coarse_off_ = true;
-  for (int body = 0; body < regions.partition().body_count(); ++body) coarse_off_ &= !regions.whole(body);
+  for (int body = 0; body < regions.partition().body_count(); ++body) {
+    const bool whole = regions.whole(body);
+    coarse_off_ &= !whole;
+    matrix_.left_out[GroupOf(body, matrix_.left_out.size())] = whole ? 0 : 1;
+  }
   grid_.off.clear();
   for (std::size_t node = 0; node < grid_.body.size(); ++node) {
     if (!regions.whole(grid_.body[node])) grid_.off.push_back(static_cast<int>(node));

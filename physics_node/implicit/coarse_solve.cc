@@ -35,14 +35,10 @@ void CoarseSpace::Solve(std::span<const Task> tasks, const float* row_sums, cons
     for (std::size_t i = 0; i < scratch_.nodes4.size(); ++i) {
       scratch_.nodes4[i] += scratch_.tube_nodes4[i];
     }
-    const auto leave_out = [this] {
-      for (const int node : grid_.off) {
-        std::fill_n(scratch_.nodes4.data() + kVertexFloats * static_cast<std::size_t>(node), kVertexFloats, 0.0f);
-      }
-    };
-    leave_out();
-    matrix_.factor.Solve(kernels_, scratch_.nodes4.data());
-    leave_out();
+    for (const int node : grid_.off) {
+      std::fill_n(scratch_.nodes4.data() + kVertexFloats * static_cast<std::size_t>(node), kVertexFloats, 0.0f);
+    }
+    matrix_.factor.Solve(kernels_, scratch_.nodes4.data(), matrix_.left_out);
   }
   workers->Run(kProlongTasks, 0, [&](int task, int) {
     ProlongToHats(hats_.rows * task / kProlongTasks, hats_.rows * (task + 1) / kProlongTasks);

@@ -42,22 +42,20 @@ std::vector<Place> Spread(int fine, int count) {
   return place;
 }
 
-/// The coarse nodes group by group, each along the longest side of the box around it: neighbours are close in it, so
-/// the factor is a band.
-std::vector<std::uint32_t> Order(const std::vector<Vec3d>& place, const std::vector<int>& group) {
-  std::vector<std::uint32_t> order;
-  for (int g = 0; order.size() < place.size(); ++g) {
-    const std::size_t first = order.size();
-    Eigen::AlignedBox3d box;
-    for (std::uint32_t i = 0; i < place.size(); ++i) {
-      if (group[i] != g) continue;
-      order.push_back(i);
-      box.extend(place[i]);
-    }
-    if (first == order.size()) continue;
+/// The coarse nodes by groups, each along the longest side of the box around it: neighbours are close in it, so the
+/// factor is a band.
+std::vector<std::vector<std::uint32_t>> Order(const std::vector<Vec3d>& place, const std::vector<std::size_t>& group,
+                                              std::size_t groups) {
+  std::vector<std::vector<std::uint32_t>> order(groups);
+  std::vector<Eigen::AlignedBox3d> box(groups);
+  for (std::uint32_t i = 0; i < place.size(); ++i) {
+    order[group[i]].push_back(i);
+    box[group[i]].extend(place[i]);
+  }
+  for (std::size_t g = 0; g < groups; ++g) {
     Eigen::Index axis = 0;
-    box.sizes().maxCoeff(&axis);
-    std::stable_sort(order.begin() + static_cast<std::ptrdiff_t>(first), order.end(),
+    if (!order[g].empty()) box[g].sizes().maxCoeff(&axis);
+    std::stable_sort(order[g].begin(), order[g].end(),
                      [&](std::uint32_t a, std::uint32_t b) { return place[a][axis] < place[b][axis]; });
   }
   return order;
@@ -256,15 +254,14 @@ void CoarseSpace::BuildLattice(const TissueScene& scene, const ElasticModel& mod
     }
   }
   place.resize(static_cast<std::size_t>(grid_.nodes));
-  // The organ with the membrane last: most other solids are joined to nothing else, and little fills in.
-  const int last = static_cast<int>(lattices.size()) - 1;
-  std::vector<int> group(place.size(), last);
+  std::vector<std::size_t> group(place.size(), GroupOf(0, lattices.size()));
   for (const auto& [key, node] : numbers) {
     const Lattice& lattice = lattices[key.first];
     place[node] = lattice.origin + lattice.spacing * Vec3d(key.second[0], key.second[1], key.second[2]);
-    if (key.first > 0) group[node] = static_cast<int>(key.first) - 1;
+    group[node] = GroupOf(static_cast<int>(key.first), lattices.size());
   }
-  matrix_.factor = CoarseFactor(Order(place, group));
+  matrix_.factor = CoarseFactor(Order(place, group, lattices.size()));
+  matrix_.left_out.assign(lattices.size(), 0);
   scratch_.nodes4 = FloatArray(kVertexFloats * static_cast<std::size_t>(grid_.nodes));
   scratch_.tube_nodes4 = FloatArray(kVertexFloats * static_cast<std::size_t>(grid_.nodes));
 }

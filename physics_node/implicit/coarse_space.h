@@ -124,6 +124,7 @@ class CoarseSpace {
     Eigen::MatrixXf constant, tube_mass;  ///< Parts that do not change: organ and bindings at rest; mass of the organ.
     Eigen::MatrixXf next;
     CoarseFactor factor;
+    std::vector<std::uint8_t> left_out;  ///< By group of the factor: of bodies that are off.
     int next_row = 0;       ///< Of the membrane, to be added to `next`.
     bool complete = false;  ///< `next` waits to be factored.
   };
@@ -134,6 +135,11 @@ class CoarseSpace {
     FloatArray tube_nodes4;      ///< The organ's part of the right side.
   };
 
+  /// Of the factor, for the nodes of a body: the membrane with the organ are the last group, since most other solids are
+  /// joined to nothing else, and little fills in.
+  static std::size_t GroupOf(int body, std::size_t bodies) {
+    return body > 0 ? static_cast<std::size_t>(body) - 1 : bodies - 1;
+  }
   void BuildHats();
   struct Lattice;
   static Lattice LatticeOf(const Solid& solid, std::size_t solids, const ElasticModel& model);

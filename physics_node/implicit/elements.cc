@@ -147,7 +147,7 @@ bool Elements::IsTissue(const ContactRow& row) { return (row.source & TissueColl
 
 Elements::Elements(const TissueScene& scene, const ElasticModel& model, const ParticleStore& particles,
                    const Partition& partition)
-    : hinges_(model, particles), guard_(model) {
+    : hinges_(model, particles), guard_(model, SolidOfVertices(scene)) {
   for (const ElasticBinding& binding : model.bindings) {
     Element e;
     e.at[0] = particles.Ref(binding.membrane);

@@ -68,7 +68,9 @@ class Elements {
 
   // Linearisation. Finding inversions and contacts are independent of each other and may run side by side.
   /// Finds the folds of the organ (InversionGuard), which act until the next call.
-  void FindInversions(const float* place) { guard_.Linearise(place); }
+  void FindInversions(const float* place, const Regions& regions) {
+    guard_.Linearise(place, regions.computed_bodies());
+  }
   /// Finds which contacts push at `place`, sliding measured from `start`, a substep of h ago; they act until the next
   /// call.
   void FindContacts(float h, const float* place, const float* start, const Regions& regions,

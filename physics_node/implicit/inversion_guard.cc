@@ -36,8 +36,11 @@ Eigen::Matrix3f Strain(const Eigen::Matrix3f& f) {
 
 }  // namespace
 
-InversionGuard::InversionGuard(const ElasticModel& model) {
+InversionGuard::InversionGuard(const ElasticModel& model, std::span<const Index> solid) {
   for (const ElasticTet& tet : model.tets) {
+    const Index of = solid.empty() ? 0 : solid[tet.v[0]];
+    if (parts_.empty() || parts_.back().solid != of) parts_.push_back({of, tets_.size(), tets_.size()});
+    ++parts_.back().end;
     Vertices& vertices = tets_.emplace_back();
     std::copy(tet.v.begin(), tet.v.end(), vertices.begin());
     Shape& shape = shapes_.emplace_back();
@@ -58,22 +61,37 @@ Eigen::Matrix3f InversionGuard::Gradient(std::size_t tet, const float* place) co
   return f;
 }
 
-void InversionGuard::Scan(const float* place) {
-  const std::size_t end = std::min(next_ + tets_.size() / kScanSubsteps + 1, tets_.size());
-  for (; next_ < end; ++next_) {
-    const Vertices& v = tets_[next_];
-    const Vec3f x0 = At(place, v[0]);
-    const float volume = (At(place, v[1]) - x0).cross(At(place, v[2]) - x0).dot(At(place, v[3]) - x0);
-    if (volume <= 0.0f &&
-        std::none_of(found_.begin(), found_.end(), [&](const Found& found) { return found.tet == next_; })) {
-      found_.emplace_back().tet = next_;
+void InversionGuard::Scan(const float* place, std::span<const std::uint8_t> computed) {
+  std::size_t all = 0;
+  for (Part& part : parts_) {
+    if (computed.empty() || computed[part.solid] != 0) part.due = part.end - part.first;
+    all += part.due > 0 ? part.end - part.first : 0;
+  }
+  std::size_t left = all / kScanSubsteps + 1;
+  for (Part& part : parts_) {
+    if (next_ >= part.end || left == 0) continue;
+    if (part.due == 0) {
+      next_ = part.end;
+      continue;
+    }
+    const std::size_t end = std::min(next_ + left, part.end);
+    left -= end - next_;
+    part.due -= std::min(end - next_, part.due);
+    for (; next_ < end; ++next_) {
+      const Vertices& v = tets_[next_];
+      const Vec3f x0 = At(place, v[0]);
+      const float volume = (At(place, v[1]) - x0).cross(At(place, v[2]) - x0).dot(At(place, v[3]) - x0);
+      if (volume <= 0.0f &&
+          std::none_of(found_.begin(), found_.end(), [&](const Found& found) { return found.tet == next_; })) {
+        found_.emplace_back().tet = next_;
+      }
     }
   }
   next_ = next_ == tets_.size() ? 0 : next_;
 }
 
-void InversionGuard::Linearise(const float* place) {
-  Scan(place);
+void InversionGuard::Linearise(const float* place, std::span<const std::uint8_t> computed) {
+  Scan(place, computed);
   for (Found& found : found_) {
     const Eigen::Matrix3f f = Gradient(found.tet, place);
     // Particles that are not finite are reset at the end of the substep; the next scan examines them again.

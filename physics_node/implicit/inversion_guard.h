@@ -14,6 +14,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "physics_node/energy/elastic_model.h"
@@ -22,11 +24,13 @@ namespace fulcrum::physics::implicit {
 
 class InversionGuard {
  public:
-  explicit InversionGuard(const ElasticModel& model);
+  /// `solid` of each vertex; empty: one for all. Tetrahedra of one solid follow each other.
+  explicit InversionGuard(const ElasticModel& model, std::span<const Index> solid = {});
 
-  /// Once a substep: examines the next part of all tetrahedra (all of them within kScanSubsteps substeps), and
-  /// linearises those found so far.
-  void Linearise(const float* place);
+  /// Once a substep: examines the next part of the tetrahedra of solids that are computed, or were since their last
+  /// examination (all of them within kScanSubsteps substeps; `computed` by solid, empty: all), and linearises those
+  /// found so far.
+  void Linearise(const float* place, std::span<const std::uint8_t> computed = {});
   /// Some tetrahedra are guarded.
   [[nodiscard]] bool folded() const { return !found_.empty(); }
   /// body(vertex) for the vertices of the tetrahedra found.
@@ -59,10 +63,16 @@ class InversionGuard {
     std::size_t tet = 0;
     Eigen::Matrix3f strain = Eigen::Matrix3f::Zero();  ///< F - R.
   };
+  /// Tetrahedra of a solid, and how many are still to be examined: all of them once after it has moved.
+  struct Part {
+    Index solid = 0;
+    std::size_t first = 0, end = 0, due = 0;
+  };
   [[nodiscard]] Eigen::Matrix3f Gradient(std::size_t tet, const float* place) const;
-  void Scan(const float* place);
+  void Scan(const float* place, std::span<const std::uint8_t> computed);
 
   std::vector<Vertices> tets_;
+  std::vector<Part> parts_;
   std::vector<Shape> shapes_;
   std::vector<Found> found_;
   std::size_t next_ = 0;

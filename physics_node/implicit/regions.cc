@@ -128,6 +128,7 @@ Regions::Regions(const Partition& partition) : partition_(partition), computed_(
   still_s_.assign(size, 0.0f);
   removed_.reserve(size);
   bodies_.resize(static_cast<std::size_t>(partition.body_count()));
+  computed_bodies_.assign(bodies_.size(), 1);
   for (int region = 0; region < partition.count(); ++region) {
     bodies_[static_cast<std::size_t>(partition.BodyOf(region))].particles += partition.ParticlesOf(region);
   }
@@ -199,7 +200,9 @@ bool Regions::Rebuild() {
     if (awake_[static_cast<std::size_t>(region)] == 0) continue;
     bodies_[static_cast<std::size_t>(partition_.BodyOf(region))].awake += partition_.ParticlesOf(region);
   }
-  for (Body& body : bodies_) {
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    Body& body = bodies_[i];
+    computed_bodies_[i] = body.awake > 0 ? 1 : 0;
     body.whole = static_cast<float>(body.awake) > kLargestAwakePart * static_cast<float>(body.particles);
   }
   removed_.clear();

@@ -97,6 +97,8 @@ class Regions {
   [[nodiscard]] bool computed(int region) const { return computed_.marked[static_cast<std::size_t>(region)] != 0; }
   [[nodiscard]] bool none_computed() const { return computed_.tasks.empty(); }
   [[nodiscard]] bool all_computed() const { return all_computed_; }
+  /// By body: some of its regions are computed.
+  [[nodiscard]] std::span<const std::uint8_t> computed_bodies() const { return computed_bodies_; }
   /// All regions of a body are computed.
   [[nodiscard]] bool whole(int body) const { return bodies_[static_cast<std::size_t>(body)].whole; }
   [[nodiscard]] const RegionSet& computed() const { return computed_; }
@@ -132,6 +134,7 @@ class Regions {
     bool whole = false;
   };
   std::vector<Body> bodies_;
+  std::vector<std::uint8_t> computed_bodies_;
   bool changed_ = true, all_computed_ = false;
 };
 

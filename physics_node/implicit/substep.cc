@@ -311,7 +311,7 @@ void Linearise(const SolverContext& context, const Inertia& inertia, std::span<c
     if (task == 0) {
       state->elements.FindContacts(inertia.h, at.point.data(), context.particles.pool(), state->regions, contacts);
     } else {
-      state->elements.FindInversions(at.point.data());
+      state->elements.FindInversions(at.point.data(), state->regions);
     }
   });
   UpdateElementDiagonal(context.model, state);

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <numeric>
 #include <vector>
@@ -30,13 +33,13 @@ Eigen::MatrixXf Chain(int reach) {
   }
   return matrix;
 }
-std::vector<std::uint32_t> AlongChain() {
+std::vector<std::vector<std::uint32_t>> AlongChain() {
   std::vector<std::uint32_t> order;
   order.reserve(kNodes);
   for (int place = 0; place < kNodes; ++place) {
     order.push_back(static_cast<std::uint32_t>(2 * place < kNodes ? 2 * place : 2 * (kNodes - place) - 1));
   }
-  return order;
+  return {order};
 }
 FloatArray RightSide() {
   FloatArray x(4 * kNodes);
@@ -56,7 +59,10 @@ TEST(CoarseFactor, SolvesAsADenseOneInAnyOrder) {
   const Eigen::VectorXd exact = matrix.cast<double>().llt().solve(right.cast<double>());
   std::vector<std::uint32_t> as_numbered(kNodes);
   std::iota(as_numbered.begin(), as_numbered.end(), 0u);
-  for (const auto& order : {as_numbered, AlongChain()}) {
+  const std::vector<std::uint32_t> along = AlongChain().front();
+  const std::vector<std::vector<std::uint32_t>> by_groups{{along.begin(), along.begin() + 11}, {along.begin() + 11, along.end()}};
+  using Groups = std::vector<std::vector<std::uint32_t>>;
+  for (const Groups& order : {Groups{as_numbered}, AlongChain(), by_groups}) {
     CoarseFactor factor(order);
     ASSERT_TRUE(factor.Take(KernelsFor(InstructionSet::kBaseline), matrix));
     FloatArray x = RightSide();
@@ -66,6 +72,53 @@ TEST(CoarseFactor, SolvesAsADenseOneInAnyOrder) {
     }
     EXPECT_EQ(x[3], 77.0f) << "the fourth value of a node is unchanged";
   }
+}
+
+TEST(CoarseFactor, LeavesOutGroups) {
+  // Three groups along the chain: what comes before is left out exactly, what lies between others as if it stood still.
+  const std::vector<std::uint32_t> along = AlongChain().front();
+  const std::vector<std::vector<std::uint32_t>> groups{
+      {along.begin(), along.begin() + 11}, {along.begin() + 11, along.begin() + 20}, {along.begin() + 20, along.end()}};
+  CoarseFactor factor(groups);
+  const Kernels& kernels = KernelsFor(InstructionSet::kBaseline);
+  ASSERT_TRUE(factor.Take(kernels, Chain(4)));
+  const auto solve = [&](FloatArray x, std::vector<std::uint8_t> left_out) {
+    factor.Solve(kernels, x.data(), left_out);
+    return x;
+  };
+  const auto only = [&](std::initializer_list<std::size_t> taken) {
+    FloatArray x = RightSide();
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      if (std::find(taken.begin(), taken.end(), g) != taken.end()) continue;
+      for (const std::uint32_t node : groups[g]) std::fill_n(x.data() + 4 * node, 3, 0.0f);
+    }
+    return x;
+  };
+  const FloatArray whole = solve(only({1, 2}), {}), part = solve(only({1, 2}), {1, 0, 0});
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    for (const std::uint32_t node : groups[g]) {
+      for (std::size_t i = 4 * node; i < 4 * node + 3; ++i) {
+        if (g == 0) {
+          EXPECT_EQ(part[i], 0.0f) << "stays as it was";
+        } else {
+          EXPECT_EQ(part[i], whole[i]);
+        }
+      }
+    }
+  }
+  // Without the middle one the result is still symmetric and positive: z_a . b = a . z_b, z_a . a > 0.
+  const FloatArray a = only({0}), b = only({2}), z_a = solve(only({0}), {0, 1, 0}), z_b = solve(only({2}), {0, 1, 0});
+  double ab = 0, ba = 0, aa = 0, bb = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (i % 4 == 3) continue;
+    ab += static_cast<double>(z_a[i] * b[i]);
+    ba += static_cast<double>(a[i] * z_b[i]);
+    aa += static_cast<double>(z_a[i] * a[i]);
+    bb += static_cast<double>(z_b[i] * b[i]);
+  }
+  EXPECT_NEAR(ab, ba, 1e-4 * std::sqrt(aa * bb));
+  EXPECT_GT(aa, 0);
+  EXPECT_GT(bb, 0);
 }
 
 TEST(CoarseFactor, IsTheSameOnEveryInstructionSet) {
