@@ -46,6 +46,9 @@ struct ShapeSettings {
   std::vector<double> radius_m;    ///< At each of them.
 };
 
+/// Of a body that is filled: a scene's vertices (kMaxTissueVertices) have some five tetrahedra each.
+inline constexpr int kMostTets = 1000000;
+
 /// The organ read from a mesh: its tetrahedra unchanged, or a surface that is filled with tetrahedra (without `wall_m`
 /// wall and lumen are one body). The membrane covers a stretch of the organ's centre line, on the side from which it is
 /// dissected, or a patch of its surface. Without `centreline_m` the importer finds line or patch, and the middle of the

@@ -15,8 +15,8 @@
 namespace fulcrum::scene {
 namespace {
 
-/// Fewer cannot represent an organ; more exceed the vertices of a scene.
-constexpr int kLeastTets = 100, kMostTets = 60000;
+/// Fewer cannot represent an organ.
+constexpr int kLeastTets = 100;
 
 /// An organ outside these limits was not given in the unit that the description says.
 constexpr double kSmallestOrgan_m = 0.008, kLargestOrgan_m = 1.0;

@@ -111,7 +111,7 @@ void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Fol
   if (map.Has("tet_edge_mm") && map.Has("target_tets")) {
     map.Fail("tet_edge_mm", "and target_tets set the same quantity: give one of them");
   }
-  ReadInteger(&map, "target_tets", 500, 60000, &import->target_tets);
+  ReadInteger(&map, "target_tets", 500, kMostTets, &import->target_tets);
   ReadSi(&map, "tet_edge_mm", Range::Between(0, 50), &import->tet_edge_m);
   ReadSi(&map, "min_edge_mm", Range::Between(0, 5), &import->min_edge_m);
   ReadInteger(&map, "organ_triangles_max", 500, 200000, &import->organ_triangles_max);
