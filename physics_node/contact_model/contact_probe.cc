@@ -58,10 +58,11 @@ ContactProbe::ContactProbe(const TissueScene& scene, const TissueModel* model, c
     : scene_(scene),
       model_(model),
       particles_(particles),
-      elastic_(scene, model, particles),
       curvature_(scene, model, particles),
       compliance_(scene.physics.dt_s),
-      step_s_(scene.physics.dt_s) {}
+      step_s_(scene.physics.dt_s) {
+  if (scene.physics.mode != PhysicsMode::kAccurate) elastic_.emplace(scene, model, particles);
+}
 
 float ContactProbe::FilterShare() const { return step_s_ / (step_s_ + kFilterTime); }
 
@@ -221,7 +222,8 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   DeviceContacts device;
   device.force_cap_N = ContactProbe::kForceCap_N;
   const auto force = [&] {
-    return solver_force == nullptr || memory.touched.empty() ? elastic_.OnSet(memory.touched) : solver_force->force;
+    if (memory.touched.empty()) return Vec3f(Vec3f::Zero());
+    return solver_force != nullptr ? solver_force->force : elastic_->OnSet(memory.touched);
   };
   const auto enter = [&](ContactKind kind) {
     if (memory.kind != kind) {

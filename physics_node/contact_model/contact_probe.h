@@ -23,6 +23,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "physics_node/collision/tool_collision.h"
@@ -47,7 +48,7 @@ class ContactProbe {
   ContactProbe(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles);
 
   /// Contacts of one tool after a step of `step_s`: a grasp, or the nearest surface within range, or none.
-  /// `solver_force`: from the solver, over that step; null: estimated from the edges.
+  /// `solver_force`: from the solver, over that step (mode accurate, always); null: estimated from the edges.
   DeviceContacts Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision, const Grasp& grasp,
                         float step_s, const ToolForce* solver_force);
   /// Before an Update that does not directly follow the last one: discards the history of the filters.
@@ -93,7 +94,7 @@ class ContactProbe {
   TissueScene scene_;
   const TissueModel* model_;
   const ParticleStore* particles_;
-  ElasticForce elastic_;
+  std::optional<ElasticForce> elastic_;  ///< In modes without forces of the solver.
   SurfaceCurvature curvature_;
   std::array<ToolMemory, kMaxTools> tools_;
   ComplianceProbe compliance_;
