@@ -3,6 +3,7 @@
 #include <iostream>
 
 #include "services/apps/fulcrum/commands.h"
+#include "services/base/config/json_schema.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/install_places.h"
 #include "services/scene/compiler/scene_yaml.h"
@@ -17,6 +18,7 @@ constexpr const char* kUsage =
        fulcrum scene check SCENE [--data DIR]
        fulcrum scene preview SCENE [--out FILE.png] [--data DIR]
        fulcrum scene explain KEY
+       fulcrum scene schema
        fulcrum scene list
 
 new      writes NAME.yaml around a mesh of an organ, with membrane, tools, scope and a script that grasps and
@@ -24,11 +26,13 @@ new      writes NAME.yaml around a mesh of an organ, with membrane, tools, scope
 check    reads and builds a scene without writing it, and prints its size and quality
 preview  draws a scene from four sides
 explain  prints a key's default and valid values; every key that contains the text
+schema   prints a JSON Schema of the keys, for an editor that completes and checks YAML
 list     lists the shipped scenes
 
 Examples:
   fulcrum scene new liver --from liver.stl && fulcrum up liver.yaml
   fulcrum scene explain cavity_mm
+  fulcrum scene schema >scene.schema.json
 )";
 
 /// A file, or the description of a shipped scene.
@@ -38,19 +42,43 @@ std::string SceneFile(const std::string& name) {
   return !fs::exists(name, error) && fs::exists(shipped, error) ? shipped.string() : name;
 }
 
-void Explain(const std::string& text) {
-  std::vector<config::KeyRule> found;
+/// Every key that is read for the shipped scenes, once.
+std::vector<config::KeyRule> AllRules() {
+  std::vector<config::KeyRule> all;
   // Keys of lists are known where a scene has them.
-  for (const char* scene : {"openhelp", "built-in", "dissection", "assisted", "gallbladder"}) {
-    for (const config::KeyRule& rule :
+  for (const char* scene : {"openhelp", "built-in", "dissection", "assisted", "gallbladder", "pelvis"}) {
+    for (config::KeyRule& rule :
          scene::SceneRules(runtime::ShareFolder() / "scenes" / (std::string(scene) + ".yaml"))) {
       const auto is_same = [&](const config::KeyRule& other) { return other.path == rule.path; };
-      if (rule.path.find(text) != std::string::npos && !rule.valid.empty() &&
-          std::none_of(found.begin(), found.end(), is_same)) {
-        found.push_back(rule);
+      if (std::none_of(all.begin(), all.end(), is_same)) all.push_back(std::move(rule));
+    }
+  }
+  return all;
+}
+
+/// Also `base`, which is resolved before the keys are read, and for each tool the keys of all: those of its kind are
+/// read, and the shipped scenes do not have each kind at each place.
+std::vector<config::KeyRule> RulesForEditors() {
+  std::vector<config::KeyRule> all{{"base", 0, "", "a text: a file beside this one, or the name of a shipped scene"}};
+  const std::vector<config::KeyRule> read = AllRules();
+  all.insert(all.end(), read.begin(), read.end());
+  for (const config::KeyRule& rule : read) {
+    for (const std::string section : {"tools.tool", "script.tool"}) {
+      if (!rule.path.starts_with(section) || rule.path.size() <= section.size()) continue;
+      for (int tool = 0; tool < kMaxTools; ++tool) {
+        all.push_back(rule);
+        all.back().path[section.size()] = static_cast<char>('0' + tool);
       }
     }
   }
+  return all;
+}
+
+void Explain(const std::string& text) {
+  std::vector<config::KeyRule> found = AllRules();
+  std::erase_if(found, [&](const config::KeyRule& rule) {
+    return rule.path.find(text) == std::string::npos || rule.valid.empty();
+  });
   if (found.empty()) {
     throw InputError("no key contains '" + text + "'; all of them: fulcrum reference scene " +
                      (runtime::ShareFolder() / "scenes/openhelp.yaml").string());
@@ -94,10 +122,13 @@ ExitCode Scene(const Words& words) {
   } else if (what == "explain") {
     Explain(needs("KEY"));
     return ExitCode::kDone;
+  } else if (what == "schema") {
+    std::cout << config::JsonSchema(RulesForEditors(), "Fulcrum scene");
+    return ExitCode::kDone;
   } else if (what == "list") {
     command.emplace_back("--list");
   } else {
-    throw InputError("no 'scene " + what + "'; valid: new, check, preview, explain, list");
+    throw InputError("no 'scene " + what + "'; valid: new, check, preview, explain, schema, list");
   }
   command.insert(command.end(), rest.begin(), rest.end());
   Become(command);

@@ -24,7 +24,7 @@ StrictYaml StrictYaml::FromText(std::string_view text, std::string_view name) {
 }
 
 StrictYaml StrictYaml::FromFileOnBases(const std::filesystem::path& file, const std::vector<std::string_view>& own,
-                                       std::string_view text) {
+                                       const std::filesystem::path& library, std::string_view text) {
   constexpr std::size_t kMostBases = 8;  // More than eight are taken for a cycle.
   constexpr std::string_view kBase = "base";
   const auto parse = [](const std::filesystem::path& at) {
@@ -47,11 +47,17 @@ StrictYaml StrictYaml::FromFileOnBases(const std::filesystem::path& file, const 
     if (document->bases.size() == kMostBases) {
       document->Fail(next->line, kBase, "more than 8 files are based on one another: is there a cycle?");
     }
-    const std::filesystem::path at = (folder / next->text).lexically_normal();
+    std::filesystem::path at = (folder / next->text).lexically_normal();
     std::error_code error;  // A name that is too long is no file either.
     if (!std::filesystem::is_regular_file(at, error)) {
-      document->Fail(next->line, kBase,
-                     Quoted(next->text) + " is not at " + at.string() + "; give a file beside this one");
+      const bool may_be_name = !library.empty() && next->text.find('/') == std::string::npos;
+      const std::filesystem::path named = library / (next->text + ".yaml");
+      if (!may_be_name || !std::filesystem::is_regular_file(named, error)) {
+        document->Fail(next->line, kBase,
+                       Quoted(next->text) + " is not at " + at.string() + "; give a file beside this one" +
+                           (library.empty() ? "" : ", or the name of one in " + library.string()));
+      }
+      at = std::filesystem::canonical(named);
     }
     auto below = parse(at);
     const Node* after = take(below.get(), kBase);

@@ -170,9 +170,10 @@ class StrictYaml {
   /// As FromFile, for a file that may be based on others: its key `base` names one, relative to its folder, which may
   /// have a base as well. Maps are merged key by key, anything else, lists included, replaces the value of the base;
   /// `own` keys are never taken from a base.
+  /// @param library a base may also be the name, without extension, of a file there.
   /// @param text replaces the content of `file` when it is not empty.
   static StrictYaml FromFileOnBases(const std::filesystem::path& file, const std::vector<std::string_view>& own,
-                                    std::string_view text = {});
+                                    const std::filesystem::path& library = {}, std::string_view text = {});
   ~StrictYaml();
   StrictYaml(StrictYaml&&) noexcept;
   StrictYaml& operator=(StrictYaml&&) noexcept;

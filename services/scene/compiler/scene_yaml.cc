@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "services/base/core/scope.h"
+#include "services/base/runtime/install_places.h"
 #include "services/scene/compiler/changes.h"
 #include "services/scene/compiler/yaml_bodies.h"
 #include "services/scene/compiler/yaml_parameters.h"
@@ -358,7 +359,8 @@ SceneDescription ReadFile(const std::filesystem::path& file, const std::filesyst
     changed = ApplyChanges(text, changes, kCompileSections);
   }
   // A scene with the name of its base would be mistaken for it.
-  StrictYaml yaml = StrictYaml::FromFileOnBases(file, {"name", "description"}, changed);
+  StrictYaml yaml =
+      StrictYaml::FromFileOnBases(file, {"name", "description"}, runtime::ShareFolder() / "scenes", changed);
   Folders bases;
   bases.files_needed = files_needed;
   for (const auto& from : yaml.files()) {

@@ -5,6 +5,7 @@
 #include "services/base/config/strict_yaml.h"
 #include "services/base/core/error.h"
 #include "services/base/core/scene_view.h"
+#include "services/base/runtime/install_places.h"
 #include "services/session/console/form.h"
 #include "services/session/supervisor/scene_cache.h"
 
@@ -17,7 +18,8 @@ constexpr std::size_t kMostKeys = 2000;  // Same limit as in the reader of scene
 
 SceneChoice ReadScene(const fs::path& file) {
   using config::Range;
-  config::StrictYaml yaml = config::StrictYaml::FromFileOnBases(file, {"name", "description"});
+  config::StrictYaml yaml =
+      config::StrictYaml::FromFileOnBases(file, {"name", "description"}, runtime::ShareFolder() / "scenes");
   config::StrictMap root = yaml.root();
   SceneChoice scene;
   scene.name = file.stem();

@@ -59,8 +59,9 @@ std::vector<std::string> PathWords(const std::string& yaml) {
 
 /// Every word that names an existing file, in the scene's folder, the data folder or a folder that the YAML names,
 /// counts as an input: a superfluous input costs a compilation, a missing one would run an outdated anatomy.
-void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const fs::path& data, std::set<fs::path>* seen,
-                     Hash64* hash) {
+void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const SceneRequest& request,
+                     std::set<fs::path>* seen, Hash64* hash) {
+  const fs::path& data = request.data;
   const std::vector<std::string> words = PathWords(yaml);
   std::vector<fs::path> bases{folder};
   if (!data.empty()) {
@@ -72,13 +73,26 @@ void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const fs::
       bases.push_back(folder / word);
     }
   }
+  // The name of a shipped scene as base.
+  constexpr std::string_view kBase = "\nbase:";
+  if (const std::size_t at = ("\n" + yaml).find(kBase); at != std::string::npos) {
+    const std::size_t begin = yaml.find_first_not_of(" \t\"'", at + kBase.size() - 1);
+    const std::string name =
+        begin == std::string::npos ? "" : yaml.substr(begin, yaml.find_first_of(" \t\r\n\"'#", begin) - begin);
+    const fs::path named = request.library / (name + ".yaml");
+    if (fs::is_regular_file(folder / name, error)) AddFile(hash, folder / name);
+    if (fs::is_regular_file(named, error) && seen->insert(fs::canonical(named, error)).second) {
+      AddFile(hash, fs::canonical(named, error));
+      AddFilesNamedIn(ReadText(named), fs::canonical(named, error).parent_path(), request, seen, hash);
+    }
+  }
   for (const std::string& word : words) {
     for (const fs::path& base : bases) {
       if (fs::is_regular_file(base / word, error)) {
         AddFile(hash, base / word);
         // A base scene may name further files.
         if (fs::path(word).extension() == ".yaml" && seen->insert(fs::canonical(base / word, error)).second) {
-          AddFilesNamedIn(ReadText(base / word), (base / word).parent_path(), data, seen, hash);
+          AddFilesNamedIn(ReadText(base / word), (base / word).parent_path(), request, seen, hash);
         }
       }
     }
@@ -92,7 +106,7 @@ fs::path FindYaml(const SceneRequest& request) {
   }
   fs::path shipped = request.library / (request.name + ".yaml");
   if (request.name.find('/') == std::string::npos && fs::is_regular_file(shipped, error)) {
-    return shipped;
+    return fs::canonical(shipped);  // In a build tree a link: meshes are searched relative to the scene's own folder.
   }
   std::string known;
   for (const std::string& name : ShippedScenes(request.library)) {
@@ -162,7 +176,7 @@ fs::path ResolveScene(const SceneRequest& request) {
   }
   AddFile(&hash, request.compiler);
   std::set<fs::path> seen;
-  AddFilesNamedIn(yaml, source.parent_path(), request.data, &seen, &hash);
+  AddFilesNamedIn(yaml, source.parent_path(), request, &seen, &hash);
   std::array<char, 24> key{};
   std::snprintf(key.data(), key.size(), "-%016llx", static_cast<unsigned long long>(hash.value()));
   fs::path target = request.cache / (source.stem().string() + key.data() + ".fulcrum");

@@ -123,7 +123,8 @@ TEST(ShippedScenes, ThePelvisIsWhole) {
   EXPECT_FALSE(fault) << fault->section << ": " << fault->reason;
   EXPECT_GE(Measure(view).vertices, 60000u);
   EXPECT_EQ(view.solids.size(), 9u) << "rectum, mesorectum, bladder, two loops, mesentery, artery, two ureters";
-  EXPECT_EQ(std::ranges::count_if(view.tools, [](const ToolDescription& tool) { return tool.kind == ToolKind::kGrasper; }), 2)
+  EXPECT_EQ(
+      std::ranges::count_if(view.tools, [](const ToolDescription& tool) { return tool.kind == ToolKind::kGrasper; }), 2)
       << "the surgeon's and the assistant's";
   EXPECT_GE(view.script_duration_s, 60.0f);
 }
@@ -369,6 +370,18 @@ class SceneOnBase : public testing::Test {
   const std::filesystem::path folder_ =
       std::filesystem::path(testing::TempDir()) / ("scene_on_base_" + std::to_string(getpid()));
 };
+
+TEST_F(SceneOnBase, ABaseMayBeTheNameOfAShippedScene) {
+  const auto file = Write("mine.yaml", "name: mine\nbase: small\nphysics:\n  grip_force_N: 5\n");
+  const SceneDescription mine = ReadSceneYaml(file, {});
+  EXPECT_NEAR(mine.settings.physics.grip_force_N, 5, 1e-6);
+  EXPECT_EQ(mine.settings.membrane.rows, ReadSceneYaml(kScenes / "small.yaml", {}).settings.membrane.rows);
+  // A file beside the scene comes first.
+  Write("small", "name: other\nbase: built-in\n");
+  EXPECT_EQ(ReadSceneYaml(file, {}).settings.membrane.rows, ReadSceneYaml(kScenes / "built-in.yaml", {}).settings.membrane.rows);
+  const std::string wrong = RefusalOf(Write("wrong.yaml", "name: wrong\nbase: smal\n"));
+  EXPECT_NE(wrong.find("or the name of one in"), std::string::npos) << wrong;
+}
 
 TEST_F(SceneOnBase, ItsKeysAreToldWhereMeshFilesAreMissing) {
   const auto file = Write("openhelp.yaml", TextOf(kScenes / "openhelp.yaml"));

@@ -55,6 +55,17 @@ TEST_F(SceneCacheTest, CompilesOnceUntilAnInputChanges) {
   EXPECT_EQ(Runs(), 3);
 }
 
+TEST_F(SceneCacheTest, ABaseByNameIsAnInput) {
+  std::ofstream(folder_.path() / "mine.yaml") << "name: mine\nbase: one  # and more\n";
+  request_.name = (folder_.path() / "mine.yaml").string();
+  (void)ResolveScene(request_);
+  (void)ResolveScene(request_);
+  EXPECT_EQ(Runs(), 1);
+  std::ofstream(folder_.path() / "meshes" / "organ.stl") << "solid of the base changed";
+  (void)ResolveScene(request_);
+  EXPECT_EQ(Runs(), 2);
+}
+
 TEST_F(SceneCacheTest, CompiledFileIsTakenAsItIs) {
   std::ofstream(folder_.path() / "ready.fulcrum") << "x";
   request_.name = (folder_.path() / "ready.fulcrum").string();
