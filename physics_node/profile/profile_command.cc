@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "physics_node/profile/forecast.h"
 #include "physics_node/profile/scene_profile.h"
 #include "services/base/core/error.h"
 #include "services/scene/format/scene_file.h"
@@ -21,7 +22,7 @@ namespace fulcrum::physics {
 namespace {
 
 struct Options {
-  std::string scene, json;
+  std::string scene, json, forecast;
   ProfileSettings settings;
 };
 
@@ -54,11 +55,14 @@ Options ParseOptions(const std::vector<std::string>& words) {
       options.settings.most_threads = static_cast<int>(Number(word, value, 1, 64));
     } else if (word == "--json") {
       options.json = value;
+    } else if (word == "--forecast") {
+      options.forecast = value;
     } else {
       throw InputError("unknown option " + word + "; see fulcrum help profile");
     }
   }
-  if (options.scene.empty()) throw InputError("usage: scene_profiler FILE [--seconds S] [--threads N] [--json FILE]");
+  if (options.scene.empty())
+    throw InputError("usage: scene_profiler FILE [--seconds S] [--threads N] [--json FILE] [--forecast FILE]");
   return options;
 }
 
@@ -139,11 +143,23 @@ void WriteJson(const SceneProfile& profile, const Advice& advice, const std::str
   if (!json.flush()) throw InputError(file + ": cannot be written");
 }
 
+/// `key value unit`, a line each.
+void WriteForecast(const Forecast& forecast, const std::string& file) {
+  std::ofstream out(file);
+  out << "forecast.period_ms " << forecast.period_ms << " ms\nforecast.all_ms " << forecast.all_ms
+      << " ms\nforecast.working_ms " << forecast.working_ms << " ms\n";
+  if (!out.flush()) throw InputError(file + ": cannot be written");
+}
+
 }  // namespace
 
 ExitCode ProfileCommand(const std::vector<std::string>& words) {
   const Options options = ParseOptions(words);
   const scene::SceneFile scene(options.scene);
+  if (!options.forecast.empty()) {
+    WriteForecast(ForecastScene(scene.view(), options.settings.most_threads), options.forecast);
+    return ExitCode::kDone;
+  }
   Progress progress;
   const SceneProfile profile = ProfileScene(scene.view(), options.settings, std::ref(progress));
   progress.End();

@@ -6,6 +6,7 @@
 #include "services/base/runtime/realtime.h"
 #include "services/session/supervisor/outcome.h"
 #include "services/session/supervisor/scene_cache.h"
+#include "services/session/supervisor/scene_forecast.h"
 #include "services/session/supervisor/supervisor.h"
 #include "services/session/supervisor/training_log.h"
 #include "services/transport/link/options.h"
@@ -209,6 +210,12 @@ ExitCode Up(const Words& words) {
   request.compiler = settings.programs / "scene_compiler";
   request.cache = SceneCache(settings.programs);
   settings.scene = ResolveScene(request);
+  if ((settings.remote >> static_cast<unsigned>(NodeId::kPhysics) & 1u) == 0) {
+    const std::string expected = ForecastOf(settings.scene, request.cache, settings.programs / "scene_profiler",
+                                            settings.cart.timing(NodeId::kPhysics).threads);
+    if (!expected.empty()) std::printf("%s\n", expected.c_str());
+    std::fflush(stdout);
+  }
   if (on_page) {
     std::printf("the tools wait for you: open the page of fulcrum console --domain %d and take the controls\n",
                 settings.cart.domain);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "physics_node/profile/forecast.h"
 #include "physics_node/profile/scene_profile.h"
 #include "services/base/core/error.h"
 #include "services/scene/builder/build.h"
@@ -35,6 +36,18 @@ TEST(Profile, ComparesThePresetsWithSmallerSteps) {
   EXPECT_LT(profile.presets[2].position_error, profile.presets[0].position_error) << "accurate against fast";
   ASSERT_EQ(profile.threads.size(), 2u);
   EXPECT_EQ(profile.threads[1].threads, 2);
+}
+
+TEST(Forecast, TellsWorkFromAllTissueInMotion) {
+  const scene::SceneData data = scene::BuildProcedural(scene::Small());
+  const Forecast forecast = ForecastScene(data.View());
+  EXPECT_NEAR(forecast.period_ms, 10, 1e-6);
+  EXPECT_GT(forecast.all_ms, 0);
+  EXPECT_GT(forecast.working_ms, 0);
+  EXPECT_GT(forecast.working_awake, 0) << "the tools have reached the tissue";
+  scene::SceneData without = scene::BuildProcedural(scene::Small());
+  without.script.clear();
+  EXPECT_EQ(ForecastScene(without.View()).working_ms, 0);
 }
 
 TEST(Profile, RefusesASceneThatHasNoPresetsOrNoScript) {
