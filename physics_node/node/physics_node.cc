@@ -11,9 +11,13 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Interval of checkpoints, of measurements of the displacement, and of frames without movement, which a renderer that
-/// starts late needs [ticks].
+/// Interval of checkpoints and of measurements of the displacement [ticks].
 constexpr std::uint64_t kSlowTicks = 10;
+/// Time from the last frame in motion to the next one [s]. It doubles with each frame at rest, so that a reader that
+/// lost one of the first soon gets another, up to the longest; while surfaces breathe it does not.
+constexpr double kFirstSilence_s = 0.1, kLongestSilence_s = 2;
+/// Below this share of real time Health says that the tissue is slow.
+constexpr float kSlowPace = 0.97f;
 /// Number of ToolStates without a tool after which the tool is removed.
 constexpr int kAbsentTicks = 100;
 /// Time without skipped periods after which the next dearer preset is set again [ticks].
@@ -214,6 +218,7 @@ void PhysicsNode::Step(const Tick& tick) {
   TakeInputs(tick);
   const StepReport report = simulation_.Step(inputs_, ticks_.count == 0 ? 1 : ticks_.periods);
   figures_.asleep_ticks.fetch_add(report.asleep ? 1 : 0, std::memory_order_relaxed);
+  MeasurePace();
   PublishContacts(tick);
   PublishCautery(tick);
   PublishFrame(tick);
@@ -224,6 +229,18 @@ void PhysicsNode::Step(const Tick& tick) {
   SaveCheckpoint();
   PublishTears(tick);
   ++ticks_.count;
+}
+
+/// The first step, after which periods are skipped while caches are initialised, does not count.
+void PhysicsNode::MeasurePace() {
+  if (ticks_.count <= 1) return;
+  const double dt_s = static_cast<double>(scene_.physics.dt_s);
+  const std::uint64_t simulated = simulation_.step_periods();
+  pace_.Add(dt_s * static_cast<double>(simulated), dt_s * static_cast<double>(ticks_.periods));
+  figures_.pace.store(static_cast<float>(pace_.value()), std::memory_order_relaxed);
+  if (ticks_.periods > simulated) {
+    figures_.lost_periods.fetch_add(ticks_.periods - simulated, std::memory_order_relaxed);
+  }
 }
 
 void PhysicsNode::PublishContacts(const Tick& tick) {
@@ -272,13 +289,18 @@ void PhysicsNode::PublishCautery(const Tick& tick) {
 
 void PhysicsNode::PublishFrame(const Tick& tick) {
   const bool moved = versions_.frame != simulation_.state_version();
-  if (!ports_.frames.has_readers() || (!moved && ticks_.count % kSlowTicks != 0)) {
+  if (!ports_.frames.has_readers() || (!moved && tick.index < frame_.due_index)) {
     return;
   }
   versions_.frame = simulation_.state_version();
+  const double dt_s = static_cast<double>(scene_.physics.dt_s);
+  frame_.silence_s =
+      moved || scene_.breathing.amplitude_m > 0 ? kFirstSilence_s : std::min(2 * frame_.silence_s, kLongestSilence_s);
+  frame_.due_index = tick.index + static_cast<std::uint64_t>(std::max(std::floor(frame_.silence_s / dt_s), 1.0));
   ports_.frames.WriteInPlace([&](TissueFrame::View view) {
     FillFrame(tick, view);
     view.header.stamp = stampers_.frame.Next(tick.stamp_ns);
+    view.header.next_within_s = std::max(frame_.silence_s, dt_s);
   });
 }
 
@@ -290,6 +312,7 @@ void PhysicsNode::FillFrame(const Tick& tick, TissueFrame::View view) const {
   header.handle_sequence = used_.handle.sequence;
   header.session_time_s = tick.session_time_s;
   header.simulated_time_s = simulation_.simulated_time_s();
+  header.next_within_s = kFirstSilence_s;
   header.vertex_count = simulation_.particles().particle_count();
   header.grasping_tools = 0;
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
@@ -324,9 +347,7 @@ void PhysicsNode::PublishManifest(const Tick& tick) {
 
 void PhysicsNode::Measure() {
   figures_.quarantined.store(simulation_.quarantined(), std::memory_order_relaxed);
-  figures_.grasped.store(
-      static_cast<std::uint32_t>(simulation_.grasp(0).held().size() + simulation_.grasp(1).held().size()),
-      std::memory_order_relaxed);
+  figures_.grasped.store(simulation_.held_particles(), std::memory_order_relaxed);
   figures_.torn_edges.store(simulation_.tears().torn_count(), std::memory_order_relaxed);
   figures_.stretch.store(simulation_.tears().largest_stretch(), std::memory_order_relaxed);
   figures_.largest_stretch.store(simulation_.tears().largest_stretch_ever(), std::memory_order_relaxed);
@@ -411,6 +432,13 @@ void PhysicsNode::FillHealth(Health* health) const {
   if (const std::uint32_t cheaper = figures_.cheaper.load(std::memory_order_relaxed); cheaper > 0) {
     add("cheaper_presets", cheaper);
     health->last_error = "steps ran late: a cheaper preset for the next seconds";
+  }
+  if (const std::uint64_t lost = figures_.lost_periods.load(std::memory_order_relaxed); lost > 0) {
+    add("time_lost_s", static_cast<double>(lost) * static_cast<double>(scene_.physics.dt_s));
+  }
+  if (const float pace = figures_.pace.load(std::memory_order_relaxed); pace < kSlowPace) {
+    health->last_error = "steps take longer than " + std::to_string(TissueSimulation::kMostStepPeriods) +
+                         " periods: the tissue moves at " + std::to_string(std::lround(100 * pace)) + " % of real time";
   }
   if (const std::uint64_t refused = figures_.topology_refused.load(std::memory_order_relaxed); refused > 0) {
     add("topology_refused", static_cast<double>(refused));

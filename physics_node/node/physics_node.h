@@ -11,6 +11,7 @@
 #include "physics_node/node/input_history.h"
 #include "physics_node/simulation/tissue_simulation.h"
 #include "services/base/core/messages.h"
+#include "services/base/core/pace.h"
 #include "services/base/core/scene_view.h"
 #include "services/base/core/tick.h"
 #include "services/base/runtime/checkpoint.h"
@@ -70,6 +71,7 @@ class PhysicsNode {
   void TakeHandles(std::int64_t now_ns);
   void CatchUp(const std::array<ToolInput, kMaxTools>& last);
   void AdaptPreset(const Tick& tick);
+  void MeasurePace();
   void PublishFrame(const Tick& tick);
   void PublishContacts(const Tick& tick);
   void NoteForce(std::size_t tool, double force_N);
@@ -126,6 +128,12 @@ class PhysicsNode {
     std::uint64_t frame = 0, hash = 0, saved = 0, measured = 0;
   };
   Versions versions_;
+  /// Of frames at rest.
+  struct FrameTime {
+    double silence_s = 0;         ///< Announced in the last one.
+    std::uint64_t due_index = 0;  ///< Tick of the next one.
+  };
+  FrameTime frame_;
   std::uint64_t state_hash_ = 0;
   struct Restart {
     bool restored = false;
@@ -153,8 +161,11 @@ class PhysicsNode {
     std::atomic<std::uint32_t> torn_edges{0};
     std::atomic<std::uint32_t> limited{0};  ///< Bit per tool: the force on it was limited.
     std::atomic<float> stretch{0}, largest_stretch{0};
+    std::atomic<float> pace{1};                  ///< Simulated over passed time.
+    std::atomic<std::uint64_t> lost_periods{0};  ///< That passed and were not simulated.
   };
   Figures figures_;
+  Pace pace_;
 };
 
 }  // namespace fulcrum::physics

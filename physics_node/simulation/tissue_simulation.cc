@@ -248,9 +248,9 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools,
   counters_.periods += step_periods_;
   ++counters_.steps;
   FollowTools(tools);
-  const bool held = grasps_[0].holding() || grasps_[1].holding();
+  const bool held = held_particles() > 0;
   UpdateGrasps();
-  const bool holds = grasps_[0].holding() || grasps_[1].holding();
+  const bool holds = held_particles() > 0;
   sleep_.asleep = sleep_.asleep && !held && !holds;
   if (StaysAsleep()) {
     StepReport report;

@@ -90,6 +90,12 @@ class TissueSimulation {
   /// without forces.
   [[nodiscard]] std::span<const ContactRow> rows() const { return rows_; }
   [[nodiscard]] const Grasp& grasp(std::uint32_t tool) const { return grasps_[tool]; }
+  /// Of all tools.
+  [[nodiscard]] std::uint32_t held_particles() const {
+    std::size_t count = 0;
+    for (const Grasp& grasp : grasps_) count += grasp.held().size();
+    return static_cast<std::uint32_t>(count);
+  }
   /// Force of the tissue on a tool as in the last Contacts [N].
   [[nodiscard]] Vec3f force(std::uint32_t tool) const { return contacts_.force(tool); }
   /// In mode accurate: force of the tissue on a tool in the last step, not filtered over steps [N].
@@ -104,6 +110,8 @@ class TissueSimulation {
   [[nodiscard]] double simulated_time_s() const {
     return static_cast<double>(counters_.periods) * static_cast<double>(scene_.physics.dt_s);
   }
+  /// Periods in the last step.
+  [[nodiscard]] std::uint32_t step_periods() const { return step_periods_; }
   /// Length of the last step [s].
   [[nodiscard]] float step_s() const { return static_cast<float>(step_periods_) * scene_.physics.dt_s; }
   /// Counter that changes whenever positions may have changed.

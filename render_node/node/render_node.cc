@@ -30,6 +30,7 @@ constexpr float kBoils_C = 90;        // Highest temperature of a patch above wh
 constexpr float kSameSoil = 0.02f;
 constexpr double kTextLife_s = 4.0;  // Duration for which a temperature or a warning is shown.
 constexpr double kLate_s = 0.3;      // Timeout of topics with a rate of 100 Hz.
+constexpr double kSlowPace = 0.97;   // Simulated over passed time below which the picture says so.
 
 bool LooksTheSame(const ToolSample& a, const ToolSample& b) {
   return a.kind == b.kind && (a.p_WT - b.p_WT).norm() < kSamePlace && a.q_WT.angularDistance(b.q_WT) < kSameAngle;
@@ -140,9 +141,14 @@ void RenderNode::TakeTissue() {
     return;
   }
   arrivals_[0].time_s = session_time_s_;
+  arrivals_[0].silence_s = new_tissue_.header.next_within_s;
   if (new_tissue_.header.scene_hash != scene_.hash || new_tissue_.xyz.size() < 3 * scene_.rest_position.size()) {
     Report("TissueFrame of another scene dropped");
     return;
+  }
+  const TissueFrameHeader &now = new_tissue_.header, &last = tissue_.header;
+  if (now.stamp.epoch == last.stamp.epoch) {
+    pace_.Add(now.simulated_time_s - last.simulated_time_s, now.session_time_s - last.session_time_s);
   }
   const bool moved = new_tissue_.xyz != tissue_.xyz;
   std::swap(tissue_, new_tissue_);
@@ -237,9 +243,12 @@ void RenderNode::UpdateTexts() {
 void RenderNode::FindLate() {
   std::vector<std::string> late;
   for (const Arrival& arrival : arrivals_) {
-    if (arrival.time_s >= 0 && session_time_s_ - arrival.time_s > kLate_s) {
+    if (arrival.time_s >= 0 && session_time_s_ - arrival.time_s > arrival.silence_s + kLate_s) {
       late.emplace_back(arrival.text);
     }
+  }
+  if (pace_.value() < kSlowPace) {
+    late.push_back("TISSUE AT " + std::to_string(5 * std::lround(20 * pace_.value())) + " % SPEED");
   }
   if (late != hud_.late) {
     hud_.late = std::move(late);

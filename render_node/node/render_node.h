@@ -18,6 +18,7 @@
 #include "render_node/node/stage.h"
 #include "render_node/offscreen/png_writer.h"
 #include "services/base/core/lens.h"
+#include "services/base/core/pace.h"
 #include "services/base/core/tick.h"
 #include "services/base/runtime/histogram.h"
 #include "services/transport/bus/input_account.h"
@@ -162,11 +163,14 @@ class RenderNode {
   bool figures_;             // Figures are shown.
   int followed_ = -1;        // Tool that the camera follows; -1: none.
   bool screenshot_ = false;  // A screenshot is requested.
-  // Session time of the last sample of each topic. A topic is late if it has had samples but none for kLate_s.
+  // Session time of the last sample of each topic, and how long it may be silent. A topic is late if it has had samples
+  // but none for kLate_s more than that.
   struct Arrival {
     const char* text;
     double time_s;
+    double silence_s = 0;
   };
+  Pace pace_;
   std::array<Arrival, 3> arrivals_{{{"TISSUE HELD", -1}, {"TOOLS HELD", -1}, {"HANDLES LATE", -1}}};
   double session_time_s_ = 0;
   double next_png_s_ = 0;

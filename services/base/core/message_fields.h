@@ -24,7 +24,7 @@ namespace fulcrum {
 #define FULCRUM_FIELDS_OF_ToolSample(F) F(kind) F(state) F(p_WT) F(q_WT) F(v_WT) F(w_WT) F(f_W) F(model_age_s) F(buttons)
 #define FULCRUM_FIELDS_OF_ToolState(F) F(stamp) F(tools)
 #define FULCRUM_FIELDS_OF_TissueFrameHeader(F) F(stamp) F(scene_hash) F(topology_revision) F(tool_sequence) \
-  F(handle_sequence) F(session_time_s) F(simulated_time_s) F(vertex_count) F(grasping_tools)
+  F(handle_sequence) F(session_time_s) F(simulated_time_s) F(next_within_s) F(vertex_count) F(grasping_tools)
 #define FULCRUM_FIELDS_OF_TissueFrame(F) F(header) F(xyz)
 #define FULCRUM_FIELDS_OF_Contact(F) F(kind) F(id) F(x_ref) F(f_ref) F(n) F(e1) F(p_s) F(v_s) F(u_c) F(du_c) F(gap) \
   F(k1) F(k3) F(kt) F(k_body) F(b_body) F(friction) F(kappa1) F(kappa2) F(slip_force) F(radius)

@@ -131,6 +131,7 @@ struct TissueFrameHeader {
   std::uint64_t handle_sequence = 0;    ///< Sequence of the consumed HandleState.
   double session_time_s = 0;
   double simulated_time_s = 0;  ///< Simulated time of these positions; breathing surfaces are placed for this time.
+  double next_within_s = 0;     ///< At most until the next frame; longer at rest.
   std::uint32_t vertex_count = 0;
   /// Bit per tool: the grasper holds tissue.
   std::uint32_t grasping_tools = 0;

@@ -25,8 +25,8 @@ struct RecordedTissueFrame {
 
 /// The encapsulation of CDR in front of a message [B].
 constexpr std::size_t kEncapsulation_B = 4;
-/// TissueFrameHeader in CDR: the stamp (32), six numbers of 8 bytes, two of 4.
-constexpr std::size_t kTissueHeader_B = 32 + 6 * 8 + 2 * 4;
+/// TissueFrameHeader in CDR: the stamp (32), seven numbers of 8 bytes, two of 4.
+constexpr std::size_t kTissueHeader_B = 32 + 7 * 8 + 2 * 4;
 
 }  // namespace
 

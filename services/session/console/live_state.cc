@@ -22,7 +22,7 @@ const InputHealth* MainInput(const Health& health) {
       case NodeId::kThermal:
         return topic == TopicId::kCauteryContact;
       case NodeId::kRender:
-        return topic == TopicId::kTissueFrame;
+        return topic == TopicId::kToolState;  // Frames of tissue at rest are rare.
       default:
         return false;
     }

@@ -55,6 +55,7 @@ std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
       Source{kThermal, "warnings", "warnings", "", 0},
       Source{kThermal, "injuries", "injuries", "", 0},
       Source{kPhysics, "quarantined", "particles quarantined", "", 0},
+      Source{kPhysics, "time_lost_s", "time that the tissue fell behind", "s", 2, false, true},
       Source{kHaptics, "motion_to_force_p50_ms", "motion to force, median", "ms", 1, true, true},
       Source{kHaptics, "motion_to_force_p99_ms", "motion to force, 99 %", "ms", 1, true, true},
       Source{kRender, "motion_to_picture_p50_ms", "motion to picture, median", "ms", 0, true, true},

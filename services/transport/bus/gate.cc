@@ -102,11 +102,15 @@ bool PassesGate(const ToolState& m) noexcept {
   return IsStamp(m.stamp) && std::all_of(m.tools.begin(), m.tools.end(), IsTool);
 }
 
+/// Longest announced time without a frame [s].
+constexpr double kMaxSilence_s = 10;
+
 bool PassesGate(const TissueFrame& m) noexcept {
   const TissueFrameHeader& h = m.header;
   return IsStamp(h.stamp) && IsSessionTime(h.session_time_s) && IsSessionTime(h.simulated_time_s) &&
-         h.vertex_count <= kMaxTissueVertices && (h.grasping_tools >> kMaxTools) == 0 &&
-         m.xyz.size() == 3 * std::size_t{h.vertex_count} && AllWithin(m.xyz, kMaxCoordinate_m);
+         Within(h.next_within_s, 0.0, kMaxSilence_s) && h.vertex_count <= kMaxTissueVertices &&
+         (h.grasping_tools >> kMaxTools) == 0 && m.xyz.size() == 3 * std::size_t{h.vertex_count} &&
+         AllWithin(m.xyz, kMaxCoordinate_m);
 }
 
 bool PassesGate(const ContactModel& m) noexcept {

@@ -182,6 +182,8 @@ SendChunk ChunkSender(LinkContext* link, PacketKind kind) {
   };
 }
 
+constexpr std::int64_t kTissueAgain_ns = 100'000'000;
+
 /// Sends the blocks that moved, at the picture rate.
 class OutgoingTissue final : public Outgoing {
  public:
@@ -191,8 +193,10 @@ class OutgoingTissue final : public Outgoing {
     if (link->now_ns < due_ns_) return due_ns_;
     const auto period = static_cast<std::int64_t>(1e9 / link->picture_rate_Hz);
     const SendChunk send = ChunkSender(link, PacketKind::kTissue);
-    if (input_->TakeLatest(&frame_)) {
+    // At rest frames are rare: the last one is sent again, since with each go some unmoved blocks.
+    if (input_->TakeLatest(&frame_) || (encoded_ns_ > 0 && link->now_ns - encoded_ns_ >= kTissueAgain_ns)) {
       sender_.Encode(frame_, send);
+      encoded_ns_ = link->now_ns;
     } else {
       sender_.Flush(send);
     }
@@ -209,7 +213,7 @@ class OutgoingTissue final : public Outgoing {
   std::unique_ptr<bus::Input<TissueFrame>> input_;
   TissueFrame frame_;
   TissueSender sender_;
-  std::int64_t due_ns_ = 0;
+  std::int64_t due_ns_ = 0, encoded_ns_ = 0;
 };
 
 /// Sends the changed tiles of every patch, since each patch has a place of its own in the atlas.

@@ -17,11 +17,13 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "services/apps/replayer/node_test.h"
 #include "services/base/config/cart.h"
 #include "services/records/log_tools/recording.h"
 #include "services/scene/format/scene_file.h"
+#include "services/transport/bus/convert/cdr.h"
 #include "tests/benchmark/report.h"
 #include "tests/support/cart.h"
 #include "tests/support/mouse_operator.h"
@@ -81,6 +83,24 @@ double PicturesIn(double seconds) {
   const double before = drawn();
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
   return drawn() - before;
+}
+
+/// Bytes of TissueFrame on the bus, a period of physics, in some seconds.
+double FrameBytes(double seconds) {
+  constexpr double kPhysics_Hz = 100;
+  bus::DdsParticipant participant(testing::ReaderOf(kDomain, "frames"));
+  const auto frames = participant.MakeInput<TissueFrame>();
+  TissueFrame frame;
+  // A late joiner gets the last frames at once: they were sent before.
+  (void)testing::WaitFor(kPatience_s, [&] { return frames->TakeLatest(&frame); });
+  std::vector<std::uint8_t> bytes;
+  double sum = 0;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  while (std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    if (frames->TakeLatest(&frame) && bus::EncodeCdr(frame, &bytes)) sum += static_cast<double>(bytes.size());
+  }
+  return sum / (kPhysics_Hz * seconds);
 }
 
 struct Step {
@@ -181,6 +201,7 @@ bool Idle(Report* report) {
       std::this_thread::sleep_for(std::chrono::seconds(4));  // The tissue comes to rest.
       report->Add("cart.idle_cpu_pct", CpuPct(cart, report->quick() ? 5 : 15), "%");
       report->Add("cart.pictures_drawn_at_rest", PicturesIn(report->quick() ? 5 : 20), "1");
+      report->Add("body.frame_kB.rest", 1e-3 * FrameBytes(report->quick() ? 4 : 20), "kB");
     }
   }
   fs::remove(yaml);
@@ -195,7 +216,7 @@ int main(int argc, char** argv) {
   const auto wants = [&report](std::initializer_list<const char*> stems) {
     return std::any_of(stems.begin(), stems.end(), [&report](const char* stem) { return report.Wants(stem); });
   };
-  const bool idle = wants({"cart.idle_cpu_pct", "cart.pictures_drawn_at_rest"});
+  const bool idle = wants({"cart.idle_cpu_pct", "cart.pictures_drawn_at_rest", "body.frame_kB.rest"});
   const bool work = wants({"cart.cpu_pct", "cart.physics", "cart.thermal", "cart.haptics", "cart.render",
                            "cart.pictures_per_s", "cart.recording_MB_per_s"});
   const bool live = wants({"cart.live_pictures_per_s", "cart.motion_to_force_ms", "cart.motion_to_picture_ms"});

@@ -79,7 +79,7 @@ class Recording final : public Target {
   }
   /// Coded messages: a key, a difference, one relative to the neighbour, one as sent.
   static Seed CodedSeed(const std::filesystem::path& file) {
-    constexpr std::size_t kHead_B = 92;  // Encapsulation and TissueFrameHeader.
+    constexpr std::size_t kHead_B = 100;  // Encapsulation and TissueFrameHeader.
     std::map<std::string, std::string> metadata{{"node", "physics_node"}};
     recording::PutPointCoding({.head_B = kHead_B}, &metadata);
     {

@@ -311,6 +311,44 @@ TEST_F(RenderNodeTest, ANewNodeShowsTheCutAfterOneTissueFrameAndOneTopology) {
   EXPECT_NE(with_cut.rgb, ReadPng(folder_ / "frame_0004900.png").rgb);
 }
 
+TEST_F(RenderNodeTest, TissueAtRestMayBeSilentForAsLongAsItSaid) {
+  const auto node = MakeNode();
+  SyntheticMoment moment = MakeSyntheticMoment(view_, 1.0);
+  moment.tissue.header.next_within_s = 2;
+  Publish(moment);
+  const auto step = [&](double time_s) {  // Poses and jaw angles arrive.
+    Stamped(&moment.tools.stamp);
+    Stamped(&moment.handles.stamp);
+    bus_.tools_out->Write(moment.tools);
+    bus_.handles_out->Write(moment.handles);
+    node->Step(At(time_s));
+  };
+  step(1.0);
+  step(2.0);
+  const double drawn = Metric(*node, "frames_drawn");
+  step(3.2);
+  EXPECT_EQ(Metric(*node, "frames_drawn"), drawn) << "nothing has changed";
+  step(3.9);
+  EXPECT_EQ(Metric(*node, "frames_drawn"), drawn + 1) << "the picture shows that tissue is late";
+}
+
+TEST_F(RenderNodeTest, SaysThatTheTissueIsSlow) {
+  const auto node = MakeNode();
+  SyntheticMoment moment = MakeSyntheticMoment(view_, 1.0);
+  const auto frame = [&](double session_s, double simulated_s) {
+    moment.tissue.header.session_time_s = session_s;
+    moment.tissue.header.simulated_time_s = simulated_s;
+    Publish(moment);
+    node->Step(At(session_s));
+    return Metric(*node, "frames_drawn");
+  };
+  (void)frame(1.0, 1.0);
+  const double drawn = frame(2.0, 2.0);
+  EXPECT_EQ(frame(2.6, 2.6), drawn) << "in real time: nothing to say";
+  EXPECT_EQ(frame(3.2, 3.0), drawn + 1) << "TISSUE AT 90 % SPEED";
+  EXPECT_EQ(frame(5.5, 5.3), drawn + 2) << "the notice is removed";
+}
+
 TEST_F(RenderNodeTest, HoldsTissueThatIsLateAndSaysSo) {
   {
     const auto node = MakeNode();

@@ -36,7 +36,7 @@ inline ToolState Sample(std::uint64_t sequence) {
 template <>
 inline TissueFrame Sample(std::uint64_t sequence) {
   TissueFrame m;
-  m.header = {{sequence, 13, 3000}, 0xfeedf00d12345678ull, 3, 4, 5, 1.25, 1.5, 20556, 2};
+  m.header = {{sequence, 13, 3000}, 0xfeedf00d12345678ull, 3, 4, 5, 1.25, 1.5, 0.1, 20556, 2};
   for (int i = 0; i < 3 * 20556; ++i) m.xyz.push_back(PositionOf(i));
   return m;
 }

@@ -60,7 +60,8 @@ TEST(CoarseFactor, SolvesAsADenseOneInAnyOrder) {
   std::vector<std::uint32_t> as_numbered(kNodes);
   std::iota(as_numbered.begin(), as_numbered.end(), 0u);
   const std::vector<std::uint32_t> along = AlongChain().front();
-  const std::vector<std::vector<std::uint32_t>> by_groups{{along.begin(), along.begin() + 11}, {along.begin() + 11, along.end()}};
+  const std::vector<std::vector<std::uint32_t>> by_groups{{along.begin(), along.begin() + 11},
+                                                          {along.begin() + 11, along.end()}};
   using Groups = std::vector<std::vector<std::uint32_t>>;
   for (const Groups& order : {Groups{as_numbered}, AlongChain(), by_groups}) {
     CoarseFactor factor(order);

@@ -5,15 +5,28 @@
 
 #include <cstring>
 #include <thread>
+#include <vector>
 
 #include "services/records/recorder/dump_writer.h"
 #include "services/records/recorder/priorities.h"
+#include "services/records/recorder/recorded_type.h"
 #include "services/records/recording/free_name.h"
+#include "services/transport/bus/convert/cdr.h"
 #include "services/transport/bus/topics.h"
 #include "tests/unit/recorder/recorder_fixture.h"
 
 namespace fulcrum::recorder {
 namespace {
+
+TEST(RecordedType, BlocksBeginBehindTheHeader) {
+  TissueFrame frame;
+  frame.header.vertex_count = 64;
+  frame.xyz.assign(3 * 64, 0.1f);
+  std::vector<std::uint8_t> bytes;
+  ASSERT_TRUE(bus::EncodeCdr(frame, &bytes));
+  constexpr std::size_t kCount_B = 4, kBlock_B = 400;
+  EXPECT_EQ(TissueCoding().head_B + kCount_B + kBlock_B, bytes.size());
+}
 
 TEST_F(RecorderTest, KeepsTopicsAndWritersApartAndTellsOfThem) {
   {

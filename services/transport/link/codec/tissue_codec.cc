@@ -41,6 +41,7 @@ void PutHeader(std::uint32_t chunk, std::uint32_t frame, const TissueFrameHeader
   w.Number(header.handle_sequence);
   w.Number(std::bit_cast<std::uint64_t>(header.session_time_s));
   w.Number(std::bit_cast<std::uint64_t>(header.simulated_time_s));
+  w.Number(std::bit_cast<std::uint64_t>(header.next_within_s));
   w.Number(header.vertex_count);
   w.Number(static_cast<std::uint8_t>(header.grasping_tools));
 }
@@ -57,6 +58,7 @@ TissueFrameHeader TakeHeader(ByteReader* r) {
   header.handle_sequence = r->Number<std::uint64_t>();
   header.session_time_s = std::bit_cast<double>(r->Number<std::uint64_t>());
   header.simulated_time_s = std::bit_cast<double>(r->Number<std::uint64_t>());
+  header.next_within_s = std::bit_cast<double>(r->Number<std::uint64_t>());
   header.vertex_count = r->Number<std::uint32_t>();
   header.grasping_tools = r->Number<std::uint8_t>();
   return header;
@@ -188,7 +190,7 @@ bool TissueReceiver::Decode(std::span<const std::uint8_t> chunk) {
   values_.clear();
   if (!in.good() || number_ == 0 || number_of_frame_ == 0 || last > 1 || header_.vertex_count == 0 ||
       header_.vertex_count > kMaxTissueVertices || !std::isfinite(header_.session_time_s) ||
-      !std::isfinite(header_.simulated_time_s)) {
+      !std::isfinite(header_.simulated_time_s) || !std::isfinite(header_.next_within_s)) {
     return false;
   }
   while (!in.empty()) {
