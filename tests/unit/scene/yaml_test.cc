@@ -378,7 +378,8 @@ TEST_F(SceneOnBase, ABaseMayBeTheNameOfAShippedScene) {
   EXPECT_EQ(mine.settings.membrane.rows, ReadSceneYaml(kScenes / "small.yaml", {}).settings.membrane.rows);
   // A file beside the scene comes first.
   Write("small", "name: other\nbase: built-in\n");
-  EXPECT_EQ(ReadSceneYaml(file, {}).settings.membrane.rows, ReadSceneYaml(kScenes / "built-in.yaml", {}).settings.membrane.rows);
+  EXPECT_EQ(ReadSceneYaml(file, {}).settings.membrane.rows,
+            ReadSceneYaml(kScenes / "built-in.yaml", {}).settings.membrane.rows);
   const std::string wrong = RefusalOf(Write("wrong.yaml", "name: wrong\nbase: smal\n"));
   EXPECT_NE(wrong.find("or the name of one in"), std::string::npos) << wrong;
 }
