@@ -22,16 +22,18 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-/// When a pedal is first pressed; the middle of the script if none is.
+/// The middle of the first stroke with a pedal pressed, where its tool is fastest; that of the script if there is none.
 double WorkBegins(const SceneView& scene) {
-  double begin_s = static_cast<double>(scene.script_duration_s);
-  bool found = false;
-  for (const ScriptKey& key : scene.script) {
-    if (key.pedals == kPedalNone) continue;
-    begin_s = std::min(begin_s, static_cast<double>(key.time_s));
-    found = true;
+  const double end_s = static_cast<double>(scene.script_duration_s);
+  double begin_s = end_s, middle_s = 0.5 * end_s;
+  for (std::size_t i = 0; i + 1 < scene.script.size(); ++i) {
+    const ScriptKey &key = scene.script[i], &next = scene.script[i + 1];
+    const auto from_s = static_cast<double>(key.time_s);
+    if (key.pedals == kPedalNone || next.tool != key.tool || from_s >= begin_s) continue;
+    begin_s = from_s;
+    middle_s = 0.5 * (from_s + static_cast<double>(next.time_s));
   }
-  return found ? begin_s : 0.5 * begin_s;
+  return middle_s;
 }
 
 }  // namespace
@@ -51,7 +53,7 @@ Forecast ForecastScene(const SceneView& scene, int threads) {
   for (int i = 0; i < kMostSettling && !simulation.asleep(); ++i) all.push_back(step_ms({}));
   forecast.all_ms = Median(all);
   if (scene.script.empty()) return forecast;
-  const double begin_s = WorkBegins(scene);
+  const double begin_s = std::max(WorkBegins(scene) - 0.5 * kWorking * period_s, 0.0);
   for (int i = 0; i < kApproach; ++i) (void)step_ms(ScriptedTools(scene, begin_s));
   std::vector<double> working;
   for (int i = 1; i <= kWorking; ++i) working.push_back(step_ms(ScriptedTools(scene, begin_s + i * period_s)));

@@ -8,13 +8,13 @@ namespace fulcrum::physics {
 struct Forecast {
   double period_ms = 0;   ///< Of the scene's steps.
   double all_ms = 0;      ///< Median of a step in which all tissue moves.
-  double working_ms = 0;  ///< The same while the tools do what the script does when it first cuts, or in its middle; 0
+  double working_ms = 0;  ///< The same while the tools do what the script does in its first stroke, or in its middle; 0
                           ///< without a script.
   double working_awake = 0;  ///< Share of the tissue that is awake then, at the end.
 };
 
 /// Steps the tissue alone: from the start, where all of it is computed, until it sleeps, then with the
-/// tools at that place of the script. Takes as long as some 150 steps.
+/// tools at that place of the script. Takes as long as some 160 steps.
 [[nodiscard]] Forecast ForecastScene(const SceneView& scene, int threads = 1);
 
 }  // namespace fulcrum::physics
