@@ -41,6 +41,7 @@ InversionGuard::InversionGuard(const ElasticModel& model, std::span<const Index>
     const Index of = solid.empty() ? 0 : solid[tet.v[0]];
     if (parts_.empty() || parts_.back().solid != of) parts_.push_back({of, tets_.size(), tets_.size()});
     ++parts_.back().end;
+    ++parts_.back().due;
     Vertices& vertices = tets_.emplace_back();
     std::copy(tet.v.begin(), tet.v.end(), vertices.begin());
     Shape& shape = shapes_.emplace_back();

@@ -52,6 +52,8 @@ TissueSimulation::TissueSimulation(const TissueScene& scene, int threads, Instru
     } else {
       implicit_.emplace(scene, elastic, model_, &particles_, threads, implicit::KernelsFor(set));
       effort_ = implicit::EffortOf(scene.physics.preset);
+      // Without gravity a scene begins in equilibrium: its bodies need not be computed until something moves them.
+      if (scene.physics.gravity.isZero(0.0f)) implicit_->Stop();
       contacts_.SetComplianceSolver(&implicit_compliance_);
     }
     held_places_.reserve(particles_.particle_count());
