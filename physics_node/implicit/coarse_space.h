@@ -125,8 +125,8 @@ class CoarseSpace {
     Eigen::MatrixXf next;
     CoarseFactor factor;
     std::vector<std::uint8_t> left_out;  ///< By group of the factor: of bodies that are off.
-    int next_row = 0;       ///< Of the membrane, to be added to `next`.
-    bool complete = false;  ///< `next` waits to be factored.
+    int next_row = 0;                    ///< Of the membrane, to be added to `next`.
+    bool complete = false;               ///< `next` waits to be factored.
   };
   /// Memory of a solve.
   struct Scratch {
@@ -135,8 +135,8 @@ class CoarseSpace {
     FloatArray tube_nodes4;      ///< The organ's part of the right side.
   };
 
-  /// Of the factor, for the nodes of a body: the membrane with the organ are the last group, since most other solids are
-  /// joined to nothing else, and little fills in.
+  /// Of the factor, for the nodes of a body: the membrane with the organ are the last group, since most other solids
+  /// are joined to nothing else, and little fills in.
   static std::size_t GroupOf(int body, std::size_t bodies) {
     return body > 0 ? static_cast<std::size_t>(body) - 1 : bodies - 1;
   }

@@ -318,8 +318,9 @@ TEST_F(OrganScene, KeysThatDoNotGoTogetherAreRefused) {
   EXPECT_NE(Refusal("    organ: tube.vtk\n    wall_mm: 3\n").find("this file holds tetrahedra"), std::string::npos);
   EXPECT_NE(Refusal("    organ: tube.obj\n    tet_edge_mm: 3\n    target_tets: 900\n").find("give one of them"),
             std::string::npos);
-  EXPECT_NE(Refusal("    organ: tube.obj\n    cap_openings: true\n    tet_edge_mm: 0.1\n").find("valid: 100 to 1000000"),
-            std::string::npos);
+  EXPECT_NE(
+      Refusal("    organ: tube.obj\n    cap_openings: true\n    tet_edge_mm: 0.1\n").find("valid: 100 to 1000000"),
+      std::string::npos);
 }
 
 }  // namespace
