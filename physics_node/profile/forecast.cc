@@ -49,6 +49,10 @@ Forecast ForecastScene(const SceneView& scene, int threads) {
   Forecast forecast;
   const double period_s = static_cast<double>(scene.physics.dt_s);
   forecast.period_ms = 1e3 * period_s;
+  // Tissue that comes from a checkpoint is awake, also in a scene that begins asleep.
+  std::vector<float> rest(3 * scene.rest_position.size());
+  simulation.particles().CopyPositions(rest);
+  (void)simulation.Restore(rest, rest, {});
   std::vector<double> all;
   for (int i = 0; i < kMostSettling && !simulation.asleep(); ++i) all.push_back(step_ms({}));
   forecast.all_ms = Median(all);
