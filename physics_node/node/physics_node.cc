@@ -16,8 +16,6 @@ constexpr std::uint64_t kSlowTicks = 10;
 /// Time from the last frame in motion to the next one [s]. It doubles with each frame at rest, so that a reader that
 /// lost one of the first soon gets another, up to the longest; while surfaces breathe it does not.
 constexpr double kFirstSilence_s = 0.1, kLongestSilence_s = 2;
-/// Below this share of real time Health says that the tissue is slow.
-constexpr float kSlowPace = 0.97f;
 /// Number of ToolStates without a tool after which the tool is removed.
 constexpr int kAbsentTicks = 100;
 /// Time without skipped periods after which the next dearer preset is set again [ticks].
@@ -436,7 +434,7 @@ void PhysicsNode::FillHealth(Health* health) const {
   if (const std::uint64_t lost = figures_.lost_periods.load(std::memory_order_relaxed); lost > 0) {
     add("time_lost_s", static_cast<double>(lost) * static_cast<double>(scene_.physics.dt_s));
   }
-  if (const float pace = figures_.pace.load(std::memory_order_relaxed); pace < kSlowPace) {
+  if (const float pace = figures_.pace.load(std::memory_order_relaxed); static_cast<double>(pace) < Pace::kSlow) {
     health->last_error = "steps take longer than " + std::to_string(TissueSimulation::kMostStepPeriods) +
                          " periods: the tissue moves at " + std::to_string(std::lround(100 * pace)) + " % of real time";
   }

@@ -30,7 +30,6 @@ constexpr float kBoils_C = 90;        // Highest temperature of a patch above wh
 constexpr float kSameSoil = 0.02f;
 constexpr double kTextLife_s = 4.0;  // Duration for which a temperature or a warning is shown.
 constexpr double kLate_s = 0.3;      // Timeout of topics with a rate of 100 Hz.
-constexpr double kSlowPace = 0.97;   // Simulated over passed time below which the picture says so.
 
 bool LooksTheSame(const ToolSample& a, const ToolSample& b) {
   return a.kind == b.kind && (a.p_WT - b.p_WT).norm() < kSamePlace && a.q_WT.angularDistance(b.q_WT) < kSameAngle;
@@ -247,7 +246,7 @@ void RenderNode::FindLate() {
       late.emplace_back(arrival.text);
     }
   }
-  if (pace_.value() < kSlowPace) {
+  if (pace_.value() < Pace::kSlow) {
     late.push_back("TISSUE AT " + std::to_string(5 * std::lround(20 * pace_.value())) + " % SPEED");
   }
   if (late != hud_.late) {

@@ -16,6 +16,8 @@ class Pace {
     passed_s_ = keep * passed_s_ + passed_s;
   }
   [[nodiscard]] double value() const { return std::min(simulated_s_ / passed_s_, 1.0); }
+  /// A value below which the tissue is called slow.
+  static constexpr double kSlow = 0.97;
 
  private:
   static constexpr double kWindow_s = 2;
