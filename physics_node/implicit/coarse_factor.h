@@ -24,8 +24,8 @@ class CoarseFactor {
  public:
   enum class Progress { kMore, kTaken, kRefused };
 
-  /// `order`: the nodes in the order of elimination, by groups. With neighbours close together L is a
-  /// band. Each group begins with a column of blocks of its own, so a solve can leave it out.
+  /// `order`: the nodes in the order of elimination, by groups. With neighbours close together L is a band.
+  /// Each group begins with a column of blocks of its own, so a solve can leave it out.
   explicit CoarseFactor(std::vector<std::vector<std::uint32_t>> order = {});
   /// Factors the next `columns` columns of blocks of `matrix`, symmetric, 3 rows per node, which must stay as it is
   /// from the first of them to the last. Then the factor is in force, and what follows begins anew. Refused as soon as

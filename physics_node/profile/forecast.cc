@@ -1,9 +1,11 @@
 #include "physics_node/profile/forecast.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <vector>
 
+#include "physics_node/profile/quantile.h"
 #include "physics_node/simulation/script_player.h"
 #include "physics_node/simulation/tissue_simulation.h"
 
@@ -14,13 +16,6 @@ namespace {
 constexpr int kMostSettling = 80;
 /// Steps with the tools: to their place, at 1 m/s, and those that count.
 constexpr int kApproach = 30, kWorking = 50;
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// The middle of the first stroke with a pedal pressed, where its tool is fastest; that of the script if there is none.
 double WorkBegins(const SceneView& scene) {
@@ -55,13 +50,13 @@ Forecast ForecastScene(const SceneView& scene, int threads) {
   (void)simulation.Restore(rest, rest, {});
   std::vector<double> all;
   for (int i = 0; i < kMostSettling && !simulation.asleep(); ++i) all.push_back(step_ms({}));
-  forecast.all_ms = Median(all);
+  forecast.all_ms = Quantile(all, 0.5);
   if (scene.script.empty()) return forecast;
   const double begin_s = std::max(WorkBegins(scene) - 0.5 * kWorking * period_s, 0.0);
   for (int i = 0; i < kApproach; ++i) (void)step_ms(ScriptedTools(scene, begin_s));
   std::vector<double> working;
   for (int i = 1; i <= kWorking; ++i) working.push_back(step_ms(ScriptedTools(scene, begin_s + i * period_s)));
-  forecast.working_ms = Median(working);
+  forecast.working_ms = Quantile(working, 0.5);
   forecast.working_awake = static_cast<double>(simulation.awake_part());
   return forecast;
 }

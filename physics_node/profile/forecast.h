@@ -13,8 +13,8 @@ struct Forecast {
   double working_awake = 0;  ///< Share of the tissue that is awake then, at the end.
 };
 
-/// Steps the tissue alone: with all of it awake until it sleeps, then with the
-/// tools at that place of the script. Takes as long as some 160 steps.
+/// Steps the tissue alone: with all of it awake until it sleeps, then with the tools at that place of the script. Takes
+/// as long as some 160 steps.
 [[nodiscard]] Forecast ForecastScene(const SceneView& scene, int threads = 1);
 
 }  // namespace fulcrum::physics

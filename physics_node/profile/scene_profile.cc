@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "physics_node/profile/quantile.h"
 #include "physics_node/simulation/script_player.h"
 #include "services/base/core/error.h"
 
@@ -16,13 +17,6 @@ constexpr int kRefined = 4;       ///< Steps of the reference in a period.
 constexpr int kSampleSteps = 10;  ///< Positions are compared once in so many periods.
 
 double Ms(Clock::duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
-
-double Quantile(std::vector<double> values, double q) {
-  if (values.empty()) return 0;
-  const auto at = static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
-}
 
 /// What is compared: positions at the samples, force on each tool in each period.
 struct Course {
