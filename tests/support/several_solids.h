@@ -55,10 +55,28 @@ void Fix(scene::SolidBody* body, const Held& held) {
   for (std::size_t i = 0; i < body->vertices.size(); ++i) body->fixed[i] = body->fixed[i] || held(body->vertices[i]);
 }
 
+/// A sheet of 25 x 13 nodes over pad, lump and both strands, with free sides and bound to nothing.
+inline scene::SheetBody Veil(const Vec3d& corner) {
+  scene::SheetBody veil;
+  veil.name = "veil";
+  veil.grid.rows = 25;
+  veil.grid.cols = 13;
+  veil.grid.bending_row_stride = 4;
+  veil.grid.bending_col_stride = 3;
+  veil.sides_held = false;
+  for (int r = 0; r < 25; ++r) {
+    for (int c = 0; c < 13; ++c) {
+      const double s = c / 12.0 - 0.5, t = r / 24.0;
+      veil.nodes.push_back(corner + Vec3d(0.02 + 0.03 * s, -0.01 + 0.08 * t, 0.04 - 0.01 * s * s));
+    }
+  }
+  return veil;
+}
+
 /// Adds solids beside the organ, 1 `pad`, 2 `lump`, 3 `strand`, 4 `other strand`, the pad's lower corner at `corner`.
-/// The lump is loose unless it is `joined` to the pad.
+/// The lump is loose unless it is `joined` to the pad. If `veiled`, with a second sheet.
 inline scene::SceneData WithSolids(scene::SceneSettings settings, const Vec3d& corner, bool joined,
-                                   double strand_Pa = 2e5) {
+                                   double strand_Pa = 2e5, bool veiled = false) {
   settings.physics.mode = PhysicsMode::kAccurate;
   settings.attach = {{"strand", "pad", 0.002, 5e4}};
   if (joined) settings.attach.push_back({"lump", "pad", 0.002, 2e4});
@@ -74,14 +92,15 @@ inline scene::SceneData WithSolids(scene::SceneSettings settings, const Vec3d& c
   anatomy.solids.push_back(Box("lump", at(0.01, 0.01, 0.016), {0.02, 0.02, 0.02}, {4, 4, 4}, 4e4));
   anatomy.solids.push_back(std::move(strand));
   anatomy.solids.push_back(std::move(other));
+  if (veiled) anatomy.sheets.push_back(Veil(corner));
   return scene::AssembleScene(settings, anatomy);
 }
 
 /// The small scene with solids 120 mm beside the organ.
-inline scene::SceneData SeveralSolids(const Vec3f& gravity = Vec3f::Zero(), bool joined = false) {
+inline scene::SceneData SeveralSolids(const Vec3f& gravity = Vec3f::Zero(), bool joined = false, bool veiled = false) {
   scene::SceneSettings settings = scene::Small();
   settings.physics.gravity = gravity;
-  return WithSolids(std::move(settings), {0.12, -0.02, 0}, joined);
+  return WithSolids(std::move(settings), {0.12, -0.02, 0}, joined, 2e5, veiled);
 }
 
 }  // namespace fulcrum

@@ -187,14 +187,23 @@ struct EmbeddedVertex {
   std::array<float, 4> barycentric;
 };
 
-/// The membrane's dynamic layer: node (row, col) is particle first + row * cols + col. Open sheet. Cell (r, c) has the
-/// triangles (n00, n01, n11) and (n00, n11, n10): its diagonal is n00-n11.
+/// The dynamic layer of the sheets: node (row, col) is particle first + row * cols + col. Cell (r, c) has the triangles
+/// (n00, n01, n11) and (n00, n11, n10): its diagonal is n00-n11. No rows and columns: a scene without a sheet.
 struct MembraneGrid {
   Index first = 0;
   std::uint32_t rows = 0, cols = 0;
   float texel_m = 1.0e-4f;  ///< Atlas texel x = s / texel_m, y = t / texel_m.
   [[nodiscard]] Index node_count() const { return rows * cols; }
   [[nodiscard]] Index triangle_count() const { return rows && cols ? 2 * (rows - 1) * (cols - 1) : 0; }
+};
+
+/// One of several sheets: a rectangle of the grid from node (first_row, 0) on. Where no rectangle is the grid has
+/// nodes, but neither edges nor cells; those nodes are fixed, at the place of the nearest node of the sheet before
+/// them.
+struct SheetPart {
+  char name[32];
+  std::uint32_t first_row, rows, cols;
+  Index over;  ///< Number of the solid that it covers; kNoIndex: spanned freely, with air on both sides.
 };
 
 enum class SurfaceRole : std::uint32_t { kAbdominalWall, kRetroperitoneum, kPelvis, kBladder, kOther };
@@ -279,7 +288,9 @@ struct SheetScene {
   MembraneGrid membrane;
   std::span<const Vec3f> rest_position;         ///< [n] of all particles, frame W, m; the membrane's from `first` on.
   std::span<const float> membrane_rest_length;  ///< [3 * rows * cols]; 0 where the grid has no such edge.
-  std::span<const Vec2f> membrane_material;     ///< [rows * cols] (s, t) of each node on the flattened sheet, m.
+  /// [rows * cols] (s, t) of each node in the atlas, m: on its flattened sheet, of which each has a place of its own.
+  std::span<const Vec2f> membrane_material;
+  std::span<const SheetPart> sheets;  ///< Ordered by row; empty: the whole grid is one sheet.
 
   std::span<const ProtectedStructure> protected_structures;
   std::span<const ProtectedPoint> protected_points;

@@ -7,16 +7,16 @@
 
 #include "services/base/core/error.h"
 #include "services/base/core/scope.h"
+#include "services/base/core/sheets.h"
 #include "services/base/core/solids.h"
 #include "services/scene/builder/build.h"
-#include "services/scene/builder/flatten.h"
 #include "services/scene/builder/geometry.h"
+#include "services/scene/builder/sheets.h"
 #include "services/scene/format/colouring.h"
 
 namespace fulcrum::scene {
 namespace {
 
-constexpr double kAtlasMargin_m = 0.001;  ///< Smallest sheet coordinate, so that a patch has texels on all sides.
 /// Distance between points of the planned line, in fractions of the sheet: the sheet is curved between given points.
 constexpr float kLineStep = 0.01f;
 constexpr int kStructurePoints = 33;  ///< Along each ureter or nerve: 6 mm apart on a 200 mm sheet.
@@ -30,93 +30,39 @@ constexpr double kLeastLever_m = 0.015;
   throw InputError("scene '" + settings.name + "': " + text);
 }
 
-/// Point and outward normal of the sheet at fractions (s, t), bilinear between its nodes.
-struct SheetPoint {
-  Vec3d p, normal;
-  Vec2f material;
-};
-
-class Sheet {
- public:
-  Sheet(const MembraneSettings& settings, const std::vector<Vec3d>& nodes, const std::vector<Vec2f>& material)
-      : rows_(settings.rows), cols_(settings.cols), nodes_(nodes), material_(material) {}
-
-  [[nodiscard]] SheetPoint At(double s, double t) const {
-    const double x = std::clamp(s, 0.0, 1.0) * (cols_ - 1), y = std::clamp(t, 0.0, 1.0) * (rows_ - 1);
-    const int c = std::min(static_cast<int>(x), cols_ - 2), r = std::min(static_cast<int>(y), rows_ - 2);
-    const double u = x - c, v = y - r;
-    const auto node = [&](int dr, int dc) {
-      return static_cast<std::size_t>(r + dr) * static_cast<std::size_t>(cols_) + static_cast<std::size_t>(c + dc);
-    };
-    const Vec3d &p00 = nodes_[node(0, 0)], &p01 = nodes_[node(0, 1)], &p10 = nodes_[node(1, 0)],
-                &p11 = nodes_[node(1, 1)];
-    SheetPoint result;
-    result.p = (1 - v) * ((1 - u) * p00 + u * p01) + v * ((1 - u) * p10 + u * p11);
-    const Vec3d ds = (1 - v) * (p01 - p00) + v * (p11 - p10), dt = (1 - u) * (p10 - p00) + u * (p11 - p01);
-    result.normal = ds.cross(dt).normalized();
-    const auto fu = static_cast<float>(u), fv = static_cast<float>(v);
-    result.material = (1 - fv) * ((1 - fu) * material_[node(0, 0)] + fu * material_[node(0, 1)]) +
-                      fv * ((1 - fu) * material_[node(1, 0)] + fu * material_[node(1, 1)]);
-    return result;
-  }
-
- private:
-  int rows_, cols_;
-  const std::vector<Vec3d>& nodes_;
-  const std::vector<Vec2f>& material_;
-};
-
-void CheckCounts(const SceneSettings& settings, const Anatomy& anatomy) {
-  const MembraneSettings& m = settings.membrane;
-  std::size_t total = anatomy.sheet.size();
-  for (const SolidBody& body : anatomy.solids) total += body.vertices.size();
-  if (m.rows < 3 || m.cols < 3 || anatomy.sheet.size() != static_cast<std::size_t>(m.rows) * m.cols) {
-    Refuse(settings, "the membrane needs at least 3 x 3 nodes");
-  }
-  if (!settings.any_size && (total > kMaxTissueVertices || anatomy.sheet.size() > kMaxMembraneNodes)) {
-    // Physics, heat, haptics, picture and supervisor together: 350 MB with 20,560 vertices, 845 MB with 204,972.
-    const std::size_t memory_MB = 295 + total / 373;
-    Refuse(settings, std::to_string(total) + " vertices (" + std::to_string(anatomy.sheet.size()) +
-                         " of them in the membrane), for which a session would need " + std::to_string(memory_MB) +
-                         " MB; valid: at most " + std::to_string(kMaxTissueVertices) +
-                         ". Lower membrane rows or columns, or the number of tetrahedra of the organ or of a body");
+void CheckSheet(const SceneSettings& settings, const SheetBody& sheet) {
+  const MembraneSettings& m = sheet.grid;
+  if (m.rows < 2 || m.cols < 2 || sheet.nodes.size() != static_cast<std::size_t>(m.rows) * m.cols) {
+    Refuse(settings, sheet.name + ": needs at least 2 x 2 nodes");
   }
   if ((m.rows - 1) % m.bending_row_stride != 0 || (m.cols - 1) % m.bending_col_stride != 0) {
-    Refuse(settings, "the bending strides (" + std::to_string(m.bending_row_stride) + ", " +
+    Refuse(settings, sheet.name + ": the bending strides (" + std::to_string(m.bending_row_stride) + ", " +
                          std::to_string(m.bending_col_stride) + ") must divide rows - 1 = " +
                          std::to_string(m.rows - 1) + " and cols - 1 = " + std::to_string(m.cols - 1));
   }
 }
 
-/// Material coordinates, offset from the edge of the atlas.
-std::vector<Vec2f> MaterialOf(const SceneSettings& settings, const std::vector<Vec3d>& sheet) {
-  const std::vector<Eigen::Vector2d> flat = FlattenSheet(settings.membrane.rows, settings.membrane.cols, sheet);
-  Eigen::Vector2d extent = Eigen::Vector2d::Zero();
-  for (const Eigen::Vector2d& m : flat) {
-    if (!m.allFinite()) {
-      Refuse(settings, "the membrane cannot be flattened: it has degenerate triangles");
-    }
-    extent = extent.cwiseMax(m);
+void CheckCounts(const SceneSettings& settings, const Anatomy& anatomy, const MembraneGrid& grid) {
+  const std::size_t nodes = grid.node_count();
+  std::size_t total = nodes;
+  for (const SolidBody& body : anatomy.solids) total += body.vertices.size();
+  if (total == 0) Refuse(settings, "there is no tissue: neither an organ nor bodies nor sheets");
+  if (anatomy.sheets.size() > kMaxSheets) {
+    Refuse(settings, std::to_string(anatomy.sheets.size()) + " sheets; valid: at most " + std::to_string(kMaxSheets));
   }
-  const double limit = kAtlasTexels * static_cast<double>(MembraneGrid().texel_m) - 2 * kAtlasMargin_m;
-  if (extent.maxCoeff() > limit) {
-    std::ostringstream text;
-    text << "the membrane is " << 1e3 * extent.x() << " x " << 1e3 * extent.y() << " mm when flattened; valid: at most "
-         << 1e3 * limit << " mm either way (the atlas)";
-    Refuse(settings, text.str());
+  if (!settings.any_size && (total > kMaxTissueVertices || nodes > kMaxMembraneNodes)) {
+    // Physics, heat, haptics, picture and supervisor together: 350 MB with 20,560 vertices, 845 MB with 204,972.
+    const std::size_t memory_MB = 295 + total / 373;
+    Refuse(settings, std::to_string(total) + " vertices (" + std::to_string(nodes) +
+                         " of them in the membrane), for which a session would need " + std::to_string(memory_MB) +
+                         " MB; valid: at most " + std::to_string(kMaxTissueVertices) +
+                         ". Lower membrane rows or columns, or the number of tetrahedra of the organ or of a body");
   }
-  std::vector<Vec2f> material;
-  material.reserve(flat.size());
-  for (const Eigen::Vector2d& m : flat) {
-    material.push_back((m + Eigen::Vector2d::Constant(kAtlasMargin_m)).cast<float>());
-  }
-  return material;
+  for (const SheetBody& sheet : anatomy.sheets) CheckSheet(settings, sheet);
 }
 
 void AddParticles(const SceneSettings& settings, const Anatomy& anatomy, SceneData* scene) {
-  const int rows = settings.membrane.rows, cols = settings.membrane.cols;
-  const std::size_t organ_count = scene->fixed.tube_vertex_count;
-  std::vector<double> mass(organ_count + anatomy.sheet.size(), 0.0);
+  std::vector<double> mass(scene->fixed.tube_vertex_count, 0.0);
   std::vector<bool> held;
   for (const SolidBody& body : anatomy.solids) {
     const std::size_t first = held.size();
@@ -134,32 +80,11 @@ void AddParticles(const SceneSettings& settings, const Anatomy& anatomy, SceneDa
     held.insert(held.end(), body.fixed.begin(), body.fixed.end());
     for (const Vec3d& p : body.vertices) scene->rest_position.push_back(p.cast<float>());
   }
-  for (const Vec3d& p : anatomy.sheet) scene->rest_position.push_back(p.cast<float>());
-  for (int r = 0; r + 1 < rows; ++r) {
-    for (int c = 0; c + 1 < cols; ++c) {
-      const std::size_t n00 = static_cast<std::size_t>(r) * cols + c;
-      for (const auto& t : {std::array{n00, n00 + 1, n00 + cols + 1}, std::array{n00, n00 + cols + 1, n00 + cols}}) {
-        const Vec3d &a = anatomy.sheet[t[0]], &b = anatomy.sheet[t[1]], &d = anatomy.sheet[t[2]];
-        const double area = (b - a).cross(d - a).norm() / 2;
-        for (const std::size_t v : t) {
-          mass[organ_count + v] += settings.membrane.density_kg_m2 * area / 3;
-        }
-      }
-    }
-  }
-  scene->inverse_mass.resize(mass.size());
   for (std::size_t i = 0; i < mass.size(); ++i) {
-    bool fixed = false;
-    if (i < organ_count) {
-      fixed = held[i];
-    } else {
-      const auto r = static_cast<int>((i - organ_count) / cols), c = static_cast<int>((i - organ_count) % cols);
-      fixed = r == 0 || r == rows - 1 || c == 0 || c == cols - 1;
-    }
-    if (!fixed && !(mass[i] > 0)) {
+    if (!held[i] && !(mass[i] > 0)) {
       Refuse(settings, "particle " + std::to_string(i) + " has no mass: it belongs to no element");
     }
-    scene->inverse_mass[i] = fixed ? 0.0f : static_cast<float>(1 / mass[i]);
+    scene->inverse_mass.push_back(held[i] ? 0.0f : static_cast<float>(1 / mass[i]));
   }
 }
 
@@ -191,7 +116,7 @@ void Embed(const SolidBody& body, Index first, const std::vector<Vec3d>& vertice
 }
 
 /// Returns the vertices of all solids, in double.
-std::vector<Vec3d> AddSolids(const Anatomy& anatomy, SceneData* scene) {
+std::vector<Vec3d> AddSolids(const Anatomy& anatomy, bool has_organ, SceneData* scene) {
   std::vector<Vec3d> vertices;
   for (const SolidBody& body : anatomy.solids) {
     const auto first = static_cast<Index>(vertices.size());
@@ -207,7 +132,8 @@ std::vector<Vec3d> AddSolids(const Anatomy& anatomy, SceneData* scene) {
   // And these before the embedding, because surface vertices refer to their tetrahedron by its index.
   scene->tet_colours = SortByColour(&scene->tets, vertices.size(), [](const Tetrahedron& t) { return ParticlesOf(t); });
   // One organ that looks like bowel is what a scene without a list of solids has.
-  const bool is_listed = anatomy.solids.size() > 1 || anatomy.solids[0].material.look != SolidLook::kBowel;
+  const bool is_listed =
+      !has_organ || anatomy.solids.size() > 1 || anatomy.solids[0].material.look != SolidLook::kBowel;
   Index first = 0;
   for (const SolidBody& body : anatomy.solids) {
     Solid solid{};
@@ -225,74 +151,6 @@ std::vector<Vec3d> AddSolids(const Anatomy& anatomy, SceneData* scene) {
     if (is_listed) scene->solids.push_back(solid);
   }
   return vertices;
-}
-
-void AddMembrane(const SceneSettings& settings, SceneData* scene) {
-  const int rows = settings.membrane.rows, cols = settings.membrane.cols;
-  const Index first = scene->fixed.membrane.first;
-  const auto node = [&](int r, int c) { return first + static_cast<Index>(r) * cols + c; };
-  scene->membrane_rest_length.assign(3 * static_cast<std::size_t>(rows) * cols, 0.0f);
-  for (int r = 0; r < rows; ++r) {
-    for (int c = 0; c < cols; ++c) {
-      constexpr int kStep[3][2] = {{0, 1}, {1, 0}, {1, 1}};
-      for (int k = 0; k < 3; ++k) {
-        const int r2 = r + kStep[k][0], c2 = c + kStep[k][1];
-        if (r2 < rows && c2 < cols) {
-          scene->membrane_rest_length[3 * (static_cast<std::size_t>(r) * cols + c) + k] =
-              static_cast<float>(RestLength(*scene, node(r, c), node(r2, c2)));
-        }
-      }
-    }
-  }
-  const int dr = settings.membrane.bending_row_stride, dc = settings.membrane.bending_col_stride;
-  const auto add = [&](Index v0, Index v1, Index v2, Index v3) {
-    const auto x = [&](Index v) { return Vec3d(scene->rest_position[v].cast<double>()); };
-    scene->bending.push_back({{v0, v1, v2, v3}, static_cast<float>(DihedralAngle(x(v0), x(v1), x(v2), x(v3)))});
-  };
-  //   n10 --- n11      interior edges of the coarse sheet: each cell's diagonal n00-n11; the edge n00-n01 where a
-  //    |   /   |       row of cells lies below it; the edge n00-n10 where a column of cells lies to its left. The
-  //   n00 --- n01      wings are chosen so that both normals point outward (s x t).
-  for (int r = 0; r + dr < rows; r += dr) {
-    for (int c = 0; c + dc < cols; c += dc) {
-      add(node(r, c), node(r + dr, c + dc), node(r + dr, c), node(r, c + dc));
-      if (r > 0) {
-        add(node(r, c), node(r, c + dc), node(r + dr, c + dc), node(r - dr, c));
-      }
-      if (c > 0) {
-        add(node(r, c), node(r + dr, c), node(r, c - dc), node(r + dr, c + dc));
-      }
-    }
-  }
-}
-
-void AddBindings(const SceneSettings& settings, const Anatomy& anatomy, const std::vector<Vec3d>& vertices,
-                 SceneData* scene) {
-  const MembraneSettings& m = settings.membrane;
-  std::vector<Triangle> surface;
-  for (const Triangle& t : scene->tube_surface) {
-    if (t[0] < anatomy.solids[0].vertices.size()) surface.push_back(t);
-  }
-  const TriangleLocator locator(vertices, surface);
-  for (int r = m.binding_row_stride / 2; r < m.rows; r += m.binding_row_stride) {
-    for (int c = m.binding_col_stride / 2 + 1; c < m.cols; c += m.binding_col_stride) {
-      const std::size_t i = static_cast<std::size_t>(r) * m.cols + c;
-      const Index particle = scene->fixed.membrane.first + static_cast<Index>(i);
-      const auto hit = locator.Closest(anatomy.sheet[i], m.binding_reach_m);
-      if (hit.triangle == kNoIndex || scene->inverse_mass[particle] == 0) {
-        continue;
-      }
-      Binding binding{particle, surface[hit.triangle], {}, static_cast<float>(hit.closest.distance)};
-      for (int k = 0; k < 3; ++k) {
-        binding.barycentric[k] = static_cast<float>(hit.closest.barycentric[k]);
-      }
-      scene->bindings.push_back(binding);
-    }
-  }
-  if (scene->bindings.empty()) {
-    std::ostringstream text;
-    text << "no membrane node lies within binding_reach = " << 1e3 * m.binding_reach_m << " mm of the organ";
-    Refuse(settings, text.str());
-  }
 }
 
 /// Springs from every vertex of a body's surface to the nearest point of another one within reach: a column of tissue
@@ -362,11 +220,24 @@ void AddSurroundings(const Anatomy& anatomy, SceneData* scene) {
   }
 }
 
-void AddStructures(const SceneSettings& settings, const Sheet& sheet, SceneData* scene) {
+/// The sheet of a name; none: the first one. `user` for the message.
+const PlacedSheet& SheetNamed(const SceneSettings& settings, const std::vector<PlacedSheet>& sheets,
+                              const std::string& name, const std::string& user) {
+  std::string names;
+  for (const PlacedSheet& sheet : sheets) {
+    if (name.empty() || name == sheet.name()) return sheet;
+    names += (names.empty() ? "" : ", ") + sheet.name();
+  }
+  if (sheets.empty()) Refuse(settings, user + ": a place on a sheet, but the scene has none; give world_mm");
+  Refuse(settings, user + ": no sheet '" + name + "'; the scene has " + names);
+}
+
+void AddStructures(const SceneSettings& settings, const std::vector<PlacedSheet>& sheets, SceneData* scene) {
   for (const StructureSettings& s : settings.structures) {
     if (s.path.size() < 2) {
       Refuse(settings, "a protected structure needs at least two points");
     }
+    const PlacedSheet& sheet = SheetNamed(settings, sheets, "", "structures");
     ProtectedStructure structure{s.kind, static_cast<float>(s.radius_m), static_cast<float>(s.depth_m),
                                  static_cast<Index>(scene->protected_points.size()), kStructurePoints};
     for (int i = 0; i < kStructurePoints; ++i) {
@@ -377,7 +248,7 @@ void AddStructures(const SceneSettings& settings, const Sheet& sheet, SceneData*
       const Vec2f p0 = k > 0 ? s.path[k - 1] : Vec2f(2 * p1 - p2);
       const Vec2f p3 = k + 2 < s.path.size() ? s.path[k + 2] : Vec2f(2 * p2 - p1);
       const Vec2f q = CatmullRom(p0, p1, p2, p3, f);
-      const SheetPoint at = sheet.At(q.x(), q.y());
+      const PlacedSheet::Point at = sheet.At(q.x(), q.y());
       scene->protected_points.push_back({(at.p - s.depth_m * at.normal).cast<float>(), at.material});
     }
     scene->protected_structures.push_back(structure);
@@ -393,7 +264,7 @@ std::uint32_t ScopesOf(const SceneSettings& settings) {
   return scopes;
 }
 
-void AddScript(const SceneSettings& settings, const Sheet& sheet, SceneData* scene) {
+void AddScript(const SceneSettings& settings, const std::vector<PlacedSheet>& sheets, SceneData* scene) {
   for (const ScriptKeySettings& key : settings.script) {
     if (key.tool < 0 || key.tool >= kMaxTools || settings.tools[key.tool].kind == ToolKind::kNone) {
       Refuse(settings, "script key at " + std::to_string(key.time_s) + " s: no tool " + std::to_string(key.tool));
@@ -404,7 +275,7 @@ void AddScript(const SceneSettings& settings, const Sheet& sheet, SceneData* sce
     }
     Vec3f p = key.world_m.value_or(Vec3f::Zero());
     if (!key.world_m) {
-      const SheetPoint at = sheet.At(key.sheet.x(), key.sheet.y());
+      const PlacedSheet::Point at = SheetNamed(settings, sheets, key.on, "script").At(key.sheet.x(), key.sheet.y());
       const ToolDescription& tool = settings.tools[key.tool];
       p = tool.kind == ToolKind::kScope ? TipLookingAt(at.p.cast<float>() + key.offset_m,
                                                        static_cast<float>(key.height_m), tool.p_WP, settings.render)
@@ -429,14 +300,14 @@ void AddScript(const SceneSettings& settings, const Sheet& sheet, SceneData* sce
   scene->fixed.script_duration_s = static_cast<float>(settings.script_duration_s);
 }
 
-void AddPlannedLine(const SceneSettings& settings, const Sheet& sheet, SceneData* scene) {
+void AddPlannedLine(const SceneSettings& settings, const std::vector<PlacedSheet>& sheets, SceneData* scene) {
   for (std::size_t i = 0; i < settings.planned_line.size(); ++i) {
     const Vec2f& to = settings.planned_line[i];
     const Vec2f& from = settings.planned_line[i > 0 ? i - 1 : 0];
     const int parts = i > 0 ? std::max(1, static_cast<int>(std::ceil((to - from).norm() / kLineStep))) : 1;
     for (int k = 1; k <= parts; ++k) {
       const Vec2f at = from + static_cast<float>(k) / static_cast<float>(parts) * (to - from);
-      scene->planned_line.push_back(sheet.At(at.x(), at.y()).material);
+      scene->planned_line.push_back(SheetNamed(settings, sheets, "", "assessment").At(at.x(), at.y()).material);
     }
   }
 }
@@ -444,7 +315,6 @@ void AddPlannedLine(const SceneSettings& settings, const Sheet& sheet, SceneData
 }  // namespace
 
 SceneData AssembleScene(const SceneSettings& settings, const Anatomy& anatomy) {
-  CheckCounts(settings, anatomy);
   SceneData scene;
   SceneView& fixed = scene.fixed;
   std::strncpy(fixed.name, settings.name.c_str(), sizeof(fixed.name) - 1);
@@ -457,21 +327,31 @@ SceneData AssembleScene(const SceneSettings& settings, const Anatomy& anatomy) {
   fixed.tools = settings.tools;
   fixed.node_mask = settings.node_mask;
   for (const SolidBody& body : anatomy.solids) fixed.tube_vertex_count += static_cast<Index>(body.vertices.size());
+  const std::vector<SheetPart> parts = PlaceSheets(anatomy.sheets);
   fixed.membrane.first = fixed.tube_vertex_count;
-  fixed.membrane.rows = static_cast<std::uint32_t>(settings.membrane.rows);
-  fixed.membrane.cols = static_cast<std::uint32_t>(settings.membrane.cols);
+  for (const SheetPart& part : parts) {
+    fixed.membrane.rows = part.first_row + part.rows;
+    fixed.membrane.cols = std::max(fixed.membrane.cols, part.cols);
+  }
+  CheckCounts(settings, anatomy, fixed.membrane);
+  // One membrane that fills the grid is what a scene without a list of sheets has.
+  if (!settings.has_organ || parts.size() > 1) scene.sheets = parts;
 
   AddParticles(settings, anatomy, &scene);
-  const std::vector<Vec3d> vertices = AddSolids(anatomy, &scene);
-  AddMembrane(settings, &scene);
-  AddBindings(settings, anatomy, vertices, &scene);
+  AddSheetParticles(anatomy.sheets, parts, &scene);
+  const std::vector<Vec3d> vertices = AddSolids(anatomy, settings.has_organ, &scene);
+  AddSheetConstraints(anatomy.sheets, parts, &scene);
+  AddBindings(settings, anatomy, parts, vertices, &scene);
   AddAttachments(settings, anatomy, vertices, &scene);
-  scene.membrane_material = MaterialOf(settings, anatomy.sheet);
+  scene.membrane_material = SheetMaterial(settings, anatomy.sheets, parts, fixed.membrane);
   AddSurroundings(anatomy, &scene);
-  const Sheet sheet(settings.membrane, anatomy.sheet, scene.membrane_material);
-  AddStructures(settings, sheet, &scene);
-  AddScript(settings, sheet, &scene);
-  AddPlannedLine(settings, sheet, &scene);
+  std::vector<PlacedSheet> sheets;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    sheets.emplace_back(anatomy.sheets[i], parts[i], fixed.membrane, scene.membrane_material);
+  }
+  AddStructures(settings, sheets, &scene);
+  AddScript(settings, sheets, &scene);
+  AddPlannedLine(settings, sheets, &scene);
 
   const std::size_t n = scene.rest_position.size();
   const auto particles = [](const auto& c) { return ParticlesOf(c); };

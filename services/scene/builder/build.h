@@ -22,10 +22,19 @@ struct SolidBody {
   std::vector<Triangle> surface_triangles;
 };
 
+/// A sheet of rows x columns nodes.
+struct SheetBody {
+  std::string name;
+  MembraneSettings grid;
+  std::vector<Vec3d> nodes;                  ///< Row by row.
+  Index over = kNoIndex;                     ///< Number of the solid to which it is bound; none: to all within reach.
+  bool ends_held = true, sides_held = true;  ///< First and last row, first and last column.
+};
+
 /// The bodies and their surroundings, procedural or imported.
 struct Anatomy {
-  std::vector<SolidBody> solids;  ///< The first is the organ under the membrane.
-  std::vector<Vec3d> sheet;       ///< Membrane nodes, row by row.
+  std::vector<SolidBody> solids;  ///< The first is the organ under the membrane, if there is one.
+  std::vector<SheetBody> sheets;  ///< The first is the membrane, if there is an organ.
   bool is_patch = false;          ///< The sheet covers a patch, not a stretch of a tube.
   struct Surrounding {
     std::string name;
@@ -39,6 +48,8 @@ struct Anatomy {
 
 /// The organ with the density and stiffness of the settings, still without shape.
 SolidBody OrganOf(const SceneSettings& settings);
+/// The membrane over it.
+SheetBody MembraneOf(const SceneSettings& settings, std::vector<Vec3d> nodes);
 
 /// Anatomy of a procedural scene, without `bodies`.
 Anatomy ProceduralAnatomy(const SceneSettings& settings);

@@ -176,13 +176,15 @@ void AddFineSurface(const TubeSettings& tube, const Shape& shape, SolidBody* out
   }
 }
 
-void AddSheet(const MembraneSettings& membrane, const Shape& shape, Anatomy* out) {
+std::vector<Vec3d> PeritoneumOf(const MembraneSettings& membrane, const Shape& shape) {
+  std::vector<Vec3d> nodes;
   for (int r = 0; r < membrane.rows; ++r) {
     for (int c = 0; c < membrane.cols; ++c) {
-      out->sheet.push_back(shape.Peritoneum(static_cast<double>(r) / (membrane.rows - 1),
-                                            (static_cast<double>(c) / (membrane.cols - 1) - 0.5) * membrane.width_m));
+      nodes.push_back(shape.Peritoneum(static_cast<double>(r) / (membrane.rows - 1),
+                                       (static_cast<double>(c) / (membrane.cols - 1) - 0.5) * membrane.width_m));
     }
   }
+  return nodes;
 }
 
 /// The fixed continuation of the sheet to the sides and beyond the ends. It begins slightly inside the membrane's rim
@@ -284,14 +286,14 @@ Anatomy ProceduralAnatomy(const SceneSettings& settings) {
   SolidBody& organ = anatomy.solids.emplace_back(OrganOf(settings));
   AddTube(settings.tube, shape, &organ);
   AddFineSurface(settings.tube, shape, &organ);
-  AddSheet(settings.membrane, shape, &anatomy);
+  anatomy.sheets.push_back(MembraneOf(settings, PeritoneumOf(settings.membrane, shape)));
   anatomy.surroundings = {Retroperitoneum(settings.tube, settings.membrane, shape),
                           PelvicFloor(settings.tube, settings.membrane, shape), AbdominalWall()};
   return anatomy;
 }
 
 SceneData BuildProcedural(const SceneSettings& settings) {
-  if (settings.import || !settings.bodies.empty()) {
+  if (settings.import || !settings.bodies.empty() || !settings.sheets.empty() || !settings.has_organ) {
     throw InputError("scene '" + settings.name + "': an imported organ and further bodies are not procedural");
   }
   return AssembleScene(settings, ProceduralAnatomy(settings));

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "services/base/core/sheets.h"
 #include "services/base/core/solids.h"
 #include "services/scene/builder/geometry.h"
 
@@ -116,6 +117,7 @@ std::vector<AtlasMetric> MeasureAtlas(const SceneView& s) {
   const std::size_t rows = s.membrane.rows, cols = s.membrane.cols;
   for (std::size_t r = 0; r + 1 < rows; ++r) {
     for (std::size_t c = 0; c + 1 < cols; ++c) {
+      if (!HasCell(s, static_cast<Index>(r), static_cast<Index>(c))) continue;
       const std::size_t n = r * cols + c;
       const auto x = [&](std::size_t k) { return Vec3d(s.rest_position[s.membrane.first + k].cast<double>()); };
       const auto m = [&](std::size_t k) { return Eigen::Vector2d(s.membrane_material[k].cast<double>()); };
@@ -168,6 +170,7 @@ std::string Describe(const SceneView& s, const SceneQuality& q) {
   add(s.solids.empty() ? "  vertices   %zu: organ %zu, membrane %u x %u"
                        : "  vertices   %zu: solids %zu, membrane %u x %u",
       q.vertices, q.organ_vertices, s.membrane.rows, s.membrane.cols);
+  for (const SheetPart& sheet : s.sheets) add("  sheet      %s: %u x %u", sheet.name, sheet.rows, sheet.cols);
   for (const Solid& solid : s.solids) {
     add("  body       %s: %u vertices, %.3g kPa", solid.name, solid.vertex_count,
         1e-3 * static_cast<double>(solid.youngs_modulus_Pa));
@@ -194,11 +197,13 @@ std::string Describe(const SceneView& s, const SceneQuality& q) {
       q.mean_least_dihedral_deg);
   add("  edges      %.2f to %.2f mm, %.2f on average", 1e3 * q.least_edge_m, 1e3 * q.largest_edge_m,
       1e3 * q.mean_edge_m);
-  add("  bindings   %.2f to %.2f mm long", 1e3 * q.least_binding_m, 1e3 * q.largest_binding_m);
-  add("  sheet      %.1f x %.1f mm flattened, lengths kept to %.2f %% rms, %.1f to %.1f %%", 1e3 * q.sheet_m[0],
-      1e3 * q.sheet_m[1], 100 * q.rms_flat_error, 100 * (q.least_flat_ratio - 1), 100 * (q.largest_flat_ratio - 1));
-  add("  atlas      true length over length in the atlas %.3f to %.3f a cell, area %.3f to %.3f", q.least_atlas_stretch,
-      q.largest_atlas_stretch, q.least_atlas_area, q.largest_atlas_area);
+  if (q.bindings > 0) add("  bindings   %.2f to %.2f mm long", 1e3 * q.least_binding_m, 1e3 * q.largest_binding_m);
+  if (q.membrane_springs > 0) {
+    add("  flattened  %.1f x %.1f mm, lengths kept to %.2f %% rms, %.1f to %.1f %%", 1e3 * q.sheet_m[0],
+        1e3 * q.sheet_m[1], 100 * q.rms_flat_error, 100 * (q.least_flat_ratio - 1), 100 * (q.largest_flat_ratio - 1));
+    add("  atlas      true length over length in the atlas %.3f to %.3f a cell, area %.3f to %.3f",
+        q.least_atlas_stretch, q.largest_atlas_stretch, q.least_atlas_area, q.largest_atlas_area);
+  }
   add("  surface    %zu vertices, %zu triangles, least embedding weight %.2f", s.surface_vertices.size(),
       s.surface_triangles.size(), q.least_weight);
   add("  around     %zu surfaces, %zu triangles; %zu ureters and nerves", s.static_surfaces.size(),

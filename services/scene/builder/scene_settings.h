@@ -128,6 +128,17 @@ struct MembraneSettings {
   double binding_reach_m = 0.0068;  ///< … where its surface is at most this far away.
 };
 
+/// A further sheet, in the frame of the bodies: over a patch of one, or spanned between two lines.
+struct SheetSettings {
+  std::string name;
+  MembraneSettings grid;  ///< Of it: all but `width_m`.
+  std::string over;       ///< A body; empty: spanned.
+  std::optional<Vec3f> at_m, facing;
+  double width_m = 0, length_m = 0;             ///< Of the patch; 0: most of the body as seen from outside.
+  std::array<std::vector<Vec3f>, 2> between_m;  ///< Points of the lines of the first and the last row.
+  bool ends_held = true, sides_held = true;     ///< The first and the last row, the first and the last column.
+};
+
 /// A ureter or nerve below the membrane, through points given as fractions of the sheet.
 struct StructureSettings {
   ProtectedKind kind = ProtectedKind::kUreter;
@@ -140,7 +151,7 @@ struct StructureSettings {
 struct ScriptKeySettings {
   double time_s = 0;
   int tool = 0;
-  std::optional<Vec3f> world_m;     ///< Set: position in W. Not set: the three fields below apply.
+  std::optional<Vec3f> world_m;     ///< Set: position in W. Not set: the four fields below apply.
   Vec2f sheet = Vec2f(0.5f, 0.5f);  ///< (s, t) fractions of the sheet in [0, 1].
   double height_m = 0;              ///< Height above the sheet at rest; negative: pressed in.
   Vec3f offset_m = Vec3f::Zero();   ///< Offset in W, added to the point on the sheet.
@@ -148,6 +159,7 @@ struct ScriptKeySettings {
   std::uint32_t pedals = kPedalNone;
   double power_W = 0;
   double roll_rad = 0;
+  std::string on = {};  ///< Name of the sheet; empty: the first one.
 };
 
 /// Appearance of a tool, from mesh files. The z axis of the files runs along the shaft to the tip; jaws are closed and,
@@ -171,11 +183,13 @@ struct SceneSettings {
   Breathing breathing;
   double organ_density_kg_m3 = 1050;
   SolidLook organ_look = SolidLook::kBowel;
-  TubeSettings tube;  ///< Used without `import`.
+  bool has_organ = true;  ///< And a membrane over it.
+  TubeSettings tube;      ///< Used without `import`.
   std::optional<ImportSettings> import;
   std::vector<BodySettings> bodies;
   std::vector<AttachSettings> attach;
   MembraneSettings membrane;
+  std::vector<SheetSettings> sheets;
   std::vector<StructureSettings> structures;
   std::array<ToolDescription, kMaxTools> tools{};
   std::array<ToolMeshSettings, kMaxTools> tool_meshes;

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include "services/base/core/error.h"
+#include "services/scene/builder/geometry.h"
+#include "services/scene/compiler/drape.h"
 #include "services/scene/compiler/fill.h"
 #include "services/scene/compiler/mesh_repair.h"
 #include "services/scene/compiler/say.h"
@@ -73,7 +76,61 @@ SolidBody BuildNamed(const BodySettings& settings, const ImportSettings& like, c
   }
 }
 
+/// Over a patch of a body, as PlacePatch finds it. `origin`: of the frame that `placement` places.
+void DrapeOver(const SheetSettings& settings, const Placement& placement, const Vec3d& origin, const Anatomy& anatomy,
+               SheetBody* sheet) {
+  const auto at = std::ranges::find(anatomy.solids, settings.over, &SolidBody::name);
+  if (at == anatomy.solids.end())
+    throw InputError("sheet '" + settings.name + "': over: no body '" + settings.over + "'");
+  sheet->over = static_cast<Index>(at - anatomy.solids.begin());
+  TriangleMesh surface{at->vertices, BoundaryOf(at->tets)};
+  ImportSettings patch;
+  patch.patch_width_m = settings.width_m;
+  patch.patch_length_m = settings.length_m;
+  if (settings.at_m) patch.patch_at_m = placement.ToWorld(settings.at_m->cast<double>() - origin).cast<float>();
+  if (settings.facing) patch.facing = (placement.R_WF * settings.facing->cast<double>()).cast<float>();
+  const Placement seen = PlacePatch(surface, patch);
+  for (Vec3d& p : surface.vertices) p = seen.ToWorld(p);
+  sheet->nodes = DrapePatch(seen.patch_width_m, seen.patch_length_m, settings.grid, surface, settings.name);
+  for (Vec3d& p : sheet->nodes) p = seen.R_WF.transpose() * p + seen.origin_m;
+}
+
+/// Straight from the line of the first row to that of the last one.
+void Span(const SheetSettings& settings, const Placement& placement, const Vec3d& origin, SheetBody* sheet) {
+  std::array<std::vector<Vec3d>, 2> rows;
+  for (std::size_t end = 0; end < 2; ++end) {
+    std::vector<Vec3d> points;
+    for (const Vec3f& p : settings.between_m[end]) points.push_back(placement.ToWorld(p.cast<double>() - origin));
+    const CentreLine line(points);
+    for (int c = 0; c < settings.grid.cols; ++c) {
+      rows[end].push_back(line.At(static_cast<double>(c) / (settings.grid.cols - 1)));
+    }
+  }
+  for (int r = 0; r < settings.grid.rows; ++r) {
+    const double t = static_cast<double>(r) / (settings.grid.rows - 1);
+    for (std::size_t c = 0; c < rows[0].size(); ++c) sheet->nodes.push_back((1 - t) * rows[0][c] + t * rows[1][c]);
+  }
+}
+
 }  // namespace
+
+void AddSheets(const SceneSettings& settings, const Placement& placement, const Progress& progress, Anatomy* anatomy) {
+  const Vec3d origin = settings.import.value_or(ImportSettings{}).origin_m.cast<double>();
+  for (const SheetSettings& wanted : settings.sheets) {
+    SheetBody sheet;
+    sheet.name = wanted.name;
+    sheet.grid = wanted.grid;
+    sheet.ends_held = wanted.ends_held;
+    sheet.sides_held = wanted.sides_held;
+    if (wanted.over.empty()) {
+      Span(wanted, placement, origin, &sheet);
+    } else {
+      DrapeOver(wanted, placement, origin, *anatomy, &sheet);
+    }
+    Say(progress, "%s: %d x %d nodes", sheet.name.c_str(), sheet.grid.rows, sheet.grid.cols);
+    anatomy->sheets.push_back(std::move(sheet));
+  }
+}
 
 void AddBodies(const SceneSettings& settings, const Placement& placement, const Progress& progress, Anatomy* anatomy) {
   const ImportSettings like = settings.import.value_or(ImportSettings{});

@@ -13,8 +13,9 @@ SceneData BuildScene(const SceneSettings& settings, const Progress& progress) {
   if (settings.import) {
     anatomy = ImportAnatomy(settings, progress);
   } else {
-    anatomy = ProceduralAnatomy(settings);
+    if (settings.has_organ) anatomy = ProceduralAnatomy(settings);
     AddBodies(settings, {}, progress, &anatomy);
+    AddSheets(settings, {}, progress, &anatomy);
   }
   SceneData scene = AssembleScene(settings, anatomy);
   AddToolMeshes(settings, &scene);

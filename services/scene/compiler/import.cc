@@ -165,7 +165,7 @@ Anatomy ImportAnatomy(const SceneSettings& described, const Progress& progress) 
   }
   Anatomy anatomy;
   anatomy.is_patch = placement.patch_width_m > 0;
-  anatomy.sheet = std::move(membrane.nodes);
+  anatomy.sheets.push_back(MembraneOf(settings, std::move(membrane.nodes)));
   SolidBody organ = OrganOf(settings);
   organ.fixed = std::move(membrane.organ_fixed);
   organ.vertices = body.tets.vertices;
@@ -175,10 +175,12 @@ Anatomy ImportAnatomy(const SceneSettings& described, const Progress& progress) 
   organ.surface_triangles = std::move(fine.triangles);
   anatomy.solids.push_back(std::move(organ));
   AddBodies(settings, placement, progress, &anatomy);
+  AddSheets(settings, placement, progress, &anatomy);
 
   // A patch ends on the organ, a stretch beside it.
   if (import.bed_m > 0 && !anatomy.is_patch) {
-    TriangleMesh bed = ContinueSideways(settings.membrane.rows, settings.membrane.cols, anatomy.sheet, import.bed_m);
+    TriangleMesh bed =
+        ContinueSideways(settings.membrane.rows, settings.membrane.cols, anatomy.sheets[0].nodes, import.bed_m);
     anatomy.surroundings.push_back(
         {"retroperitoneum", SurfaceRole::kRetroperitoneum, true, std::move(bed.vertices), std::move(bed.triangles)});
   }

@@ -65,7 +65,9 @@ std::vector<Vec3d> ObstaclesOf(const Anatomy& anatomy) {
   for (const SolidBody& body : anatomy.solids) {
     obstacles.insert(obstacles.end(), body.vertices.begin(), body.vertices.end());
   }
-  obstacles.insert(obstacles.end(), anatomy.sheet.begin(), anatomy.sheet.end());
+  for (const SheetBody& sheet : anatomy.sheets) {
+    obstacles.insert(obstacles.end(), sheet.nodes.begin(), sheet.nodes.end());
+  }
   for (const Anatomy::Surrounding& s : anatomy.surroundings) {
     obstacles.insert(obstacles.end(), s.vertices.begin(), s.vertices.end());
   }
@@ -129,10 +131,11 @@ double CrowdedPart(const Anatomy& anatomy) {
   constexpr double kTouch_m = 0.004;
   constexpr std::size_t kStep = 13;
   std::size_t nodes = 0, crowded = 0;
-  for (std::size_t i = 0; i < anatomy.sheet.size(); i += kStep, ++nodes) {
+  for (std::size_t i = 0; i < anatomy.sheets[0].nodes.size(); i += kStep, ++nodes) {
     for (const Anatomy::Surrounding& s : anatomy.surroundings) {
-      const bool touches = std::any_of(s.vertices.begin(), s.vertices.end(),
-                                       [&](const Vec3d& p) { return (p - anatomy.sheet[i]).norm() < kTouch_m; });
+      const bool touches = std::any_of(s.vertices.begin(), s.vertices.end(), [&](const Vec3d& p) {
+        return (p - anatomy.sheets[0].nodes[i]).norm() < kTouch_m;
+      });
       if (touches && s.role != SurfaceRole::kRetroperitoneum) {
         ++crowded;
         break;
@@ -314,7 +317,7 @@ std::string DescribeNewScene(const NewScene& given, const Progress& progress) {
   Anatomy anatomy = take();
   if (!scene.facing && !scene.neighbours.empty()) ChooseSide(&scene, &import, take, &anatomy);
   const std::vector<Vec3d> obstacles = ObstaclesOf(anatomy);
-  const SheetSize size = SizeOf(settings.membrane, anatomy.sheet);
+  const SheetSize size = SizeOf(settings.membrane, anatomy.sheets[0].nodes);
   ChooseMembrane(size, &settings.membrane);
 
   double radius = 0;

@@ -4,6 +4,7 @@
 #include <array>
 #include <string_view>
 
+#include "services/base/core/sheets.h"
 #include "services/base/core/solids.h"
 #include "services/base/picture/solid_view.h"
 #include "services/scene/builder/geometry.h"
@@ -84,10 +85,11 @@ class ScenePainter {
       const SolidLook look = scene.solids.empty() ? SolidLook::kBowel : scene.solids[solid[t[0]]].look;
       (is_fixed ? fixed_ : free_[static_cast<std::size_t>(look)]).push_back(t);
     }
-    const auto rows = static_cast<int>(scene.membrane.rows), cols = static_cast<int>(scene.membrane.cols);
-    for (Triangle t : GridTriangles(rows, cols)) {
-      for (Index& v : t) v += scene.membrane.first;
-      membrane_.push_back(t);
+    for (const SheetPart& sheet : SheetsOf(scene)) {
+      for (Triangle t : GridTriangles(static_cast<int>(sheet.rows), static_cast<int>(sheet.cols))) {
+        for (Index& v : t) v = NodeOf(sheet, static_cast<int>(v / sheet.cols), static_cast<int>(v % sheet.cols));
+        membrane_.push_back(t);
+      }
     }
     for (const Vec3d& p : rest_) bounds_.Add(p);
   }
@@ -102,7 +104,7 @@ class ScenePainter {
       if (std::string_view(s.name) == "cavity") continue;  // Around everything.
       view->Solid(around_, scene_.static_triangles.subspan(s.first_triangle, s.triangle_count), kAround, false);
     }
-    PaintGrid(view);
+    for (const SheetPart& sheet : SheetsOf(scene_)) PaintGrid(sheet, view);
     for (const ProtectedStructure& s : scene_.protected_structures) {
       for (Index i = s.first_point; i + 1 < s.first_point + s.point_count; ++i) {
         view->Line(scene_.protected_points[i].p_W.cast<double>(), scene_.protected_points[i + 1].p_W.cast<double>(), 3,
@@ -113,10 +115,16 @@ class ScenePainter {
   }
 
  private:
-  void PaintGrid(SolidView* view) const {
+  /// The particle of a node of a sheet.
+  [[nodiscard]] Index NodeOf(const SheetPart& sheet, int row, int col) const {
+    return scene_.membrane.first + (sheet.first_row + static_cast<Index>(row)) * scene_.membrane.cols +
+           static_cast<Index>(col);
+  }
+
+  void PaintGrid(const SheetPart& sheet, SolidView* view) const {
     constexpr int kLines = 12;
-    const auto rows = static_cast<int>(scene_.membrane.rows), cols = static_cast<int>(scene_.membrane.cols);
-    const auto node = [&](int r, int c) { return rest_[scene_.membrane.first + static_cast<Index>(r * cols + c)]; };
+    const auto rows = static_cast<int>(sheet.rows), cols = static_cast<int>(sheet.cols);
+    const auto node = [&](int r, int c) { return rest_[NodeOf(sheet, r, c)]; };
     for (int k = 0; k <= kLines; ++k) {
       const int r = k * (rows - 1) / kLines, c = k * (cols - 1) / kLines;
       for (int i = 0; i + 1 < cols; ++i) view->Line(node(r, i), node(r, i + 1), 1, kGrid, kSlack_m);

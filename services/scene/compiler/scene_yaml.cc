@@ -152,6 +152,22 @@ void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Fol
   }
 }
 
+void ReadOrgan(StrictMap* root, const Folders& bases, SceneSettings* scene, Folders* folders) {
+  StrictMap organ = root->Map("organ");
+  ReadSi(&organ, "density_kg_m3", Range::Between(1, 1e5), &scene->organ_density_kg_m3);
+  scene->organ_look = organ.Choice("look", scene->organ_look, kSolidLookNames);
+  organ.KeepNearer("import", "procedural");
+  if (organ.Has("import") == organ.Has("procedural")) {
+    root->Fail("organ", "needs either `procedural` or `import`");
+  }
+  if (organ.Has("import")) {
+    ReadImport(organ.Map("import"), bases, &scene->import.emplace(), folders);
+  } else {
+    ReadTube(organ.Map("procedural"), &scene->tube);
+    folders->insert(folders->end(), bases.begin(), bases.end());
+  }
+}
+
 void ReadMembrane(StrictMap map, MembraneSettings* m) {
   ReadInteger(&map, "rows", 3, 5000, &m->rows);
   ReadInteger(&map, "cols", 3, 5000, &m->cols);
@@ -238,6 +254,7 @@ ScriptKeySettings ReadKey(StrictMap map, double duration_s) {
     key.world_m = map.Vector3Si("world_mm", Range::Between(-1000, 1000));
   } else {
     key.sheet = ToVec2(map.Numbers("sheet", 2, 2, Range::Between(0, 1)));
+    key.on = map.TextOr("on", "", 31);
     key.height_m = map.NumberSi("height_mm", Range::Between(-30, 500));
     key.offset_m = map.Vector3Si("offset_mm", key.offset_m, Range::Between(-200, 200));
   }
@@ -305,29 +322,23 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesys
   StrictMap root = yaml->root();
   scene.name = root.Text("name", 63);
   scene.description = root.TextOr("description", "");
-  StrictMap organ = root.Map("organ");
-  ReadSi(&organ, "density_kg_m3", Range::Between(1, 1e5), &scene.organ_density_kg_m3);
-  scene.organ_look = organ.Choice("look", scene.organ_look, kSolidLookNames);
-  organ.KeepNearer("import", "procedural");
-  if (organ.Has("import") == organ.Has("procedural")) {
-    root.Fail("organ", "needs either `procedural` or `import`");
-  }
   Folders folders;
   folders.files_needed = bases.files_needed;
   if (!data.empty()) {
     folders.push_back(data);
   }
-  if (organ.Has("import")) {
-    ReadImport(organ.Map("import"), bases, &scene.import.emplace(), &folders);
+  scene.has_organ = root.Has("organ") || (!root.Has("bodies") && !root.Has("sheets"));
+  if (scene.has_organ) {
+    ReadOrgan(&root, bases, &scene, &folders);
   } else {
-    ReadTube(organ.Map("procedural"), &scene.tube);
     folders.insert(folders.end(), bases.begin(), bases.end());
+    if (root.Has("membrane")) root.Fail("membrane", "lies over an organ, and there is none: describe it in `sheets`");
   }
   const auto find = [&](const StrictMap& map, const std::string& key) {
     return FindFile(map, key, StrictMap(map).Text(key), folders);
   };
   ReadBodies(&root, find, &scene);
-  ReadMembrane(root.MapOrDefaults("membrane"), &scene.membrane);
+  if (scene.has_organ) ReadMembrane(root.MapOrDefaults("membrane"), &scene.membrane);
   for (StrictMap& entry : root.Maps("structures", 0, kMaxStructures)) {
     scene.structures.push_back(ReadStructure(entry));
   }
@@ -345,7 +356,13 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesys
   if (auto assessment = root.OptionalMap("assessment")) {
     ReadAssessment(*assessment, &scene.assessment, &scene.planned_line);
   }
+  // Only sheets can be burnt.
+  const bool has_sheets = scene.has_organ || !scene.sheets.empty();
+  if (!has_sheets) scene.node_mask &= ~(1u << static_cast<unsigned>(NodeId::kThermal));
   scene.node_mask = ReadNodes(&root, scene.node_mask);
+  if (!has_sheets && (scene.node_mask >> static_cast<unsigned>(NodeId::kThermal) & 1u) != 0) {
+    root.Fail("nodes", "thermal_node needs a sheet, and the scene has none");
+  }
   yaml->Finish();
   return {scene, yaml->Effective(), yaml->Rules()};
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <set>
 
+#include "services/base/core/sheets.h"
 #include "services/scene/compiler/yaml_parameters.h"
 
 namespace fulcrum::scene {
@@ -13,6 +14,8 @@ using config::StrictMap;
 
 constexpr std::size_t kMostLinePoints = 64;
 constexpr std::size_t kMostAttachments = 400;
+constexpr int kBendingRows = 4, kBendingCols = 7;  ///< Largest strides of the hinges, as of the built-in membrane.
+constexpr double kBindingReach_m = 0.0013;         ///< Beyond the gap, likewise.
 
 enum class Ends { kNone, kFirst, kLast, kBoth };
 const StrictMap::Choices<Ends> kEnds = {
@@ -76,6 +79,57 @@ BodySettings ReadBody(StrictMap map, const FindMesh& find) {
   return body;
 }
 
+enum class Held { kAll, kNone, kRows, kColumns };
+const StrictMap::Choices<Held> kHeld = {
+    {"all", Held::kAll}, {"none", Held::kNone}, {"ends", Held::kRows}, {"sides", Held::kColumns}};
+
+/// The largest divisor of `cells` up to `most`.
+int Stride(int cells, int most) {
+  while (cells % most != 0) --most;
+  return most;
+}
+
+SheetSettings ReadSheet(StrictMap map) {
+  SheetSettings sheet;
+  sheet.name = map.Text("name", 31);
+  if (map.Has("over") == map.Has("between")) {
+    map.Fail("name", "needs one of `over` (a body) and `between` (two lines)");
+  }
+  MembraneSettings& grid = sheet.grid;
+  grid.rows = 33;
+  grid.cols = 29;
+  if (map.Has("over")) {
+    sheet.over = map.Text("over", 31);
+    if (map.Has("at_mm")) sheet.at_m = map.Vector3Si("at_mm", Range::Between(-5000, 5000));
+    if (map.Has("facing")) {
+      sheet.facing = map.Vector3Si("facing", Range::Between(-1, 1));
+      if (!(sheet.facing->norm() > 0.1f)) map.Fail("facing", "must be a direction, not (nearly) zero");
+    }
+    if (map.Has("width_mm")) sheet.width_m = map.NumberSi("width_mm", Range::Between(5, 400));
+    if (map.Has("length_mm")) sheet.length_m = map.NumberSi("length_mm", Range::Between(5, 400));
+    grid.gap_m = 0.0015;
+    ReadSi(&map, "gap_mm", Range::Between(0.5, 30), &grid.gap_m);
+  } else {
+    StrictMap between = map.Map("between");
+    StrictMap first = between.Map("first"), last = between.Map("last");
+    sheet.between_m = {ReadLine(&first), ReadLine(&last)};
+    grid.gap_m = 0.003;
+  }
+  ReadInteger(&map, "rows", 2, 5000, &grid.rows);
+  ReadInteger(&map, "cols", 2, 5000, &grid.cols);
+  ReadSi(&map, "density_kg_m2", Range::Between(0.01, 50), &grid.density_kg_m2);
+  ReadInteger(&map, "binding_row_stride", 1, 1000, &grid.binding_row_stride);
+  ReadInteger(&map, "binding_col_stride", 1, 1000, &grid.binding_col_stride);
+  grid.binding_reach_m = grid.gap_m + kBindingReach_m;
+  ReadSi(&map, "binding_reach_mm", Range::Between(0.5, 60), &grid.binding_reach_m);
+  grid.bending_row_stride = Stride(grid.rows - 1, kBendingRows);
+  grid.bending_col_stride = Stride(grid.cols - 1, kBendingCols);
+  const Held held = map.Choice("held", Held::kAll, kHeld);
+  sheet.ends_held = held == Held::kAll || held == Held::kRows;
+  sheet.sides_held = held == Held::kAll || held == Held::kColumns;
+  return sheet;
+}
+
 }  // namespace
 
 const StrictMap::Choices<SolidLook> kSolidLookNames = {
@@ -113,17 +167,27 @@ ShapeSettings ReadShape(StrictMap map) {
 }
 
 void ReadBodies(StrictMap* root, const FindMesh& find, SceneSettings* scene) {
-  std::set<std::string> names{"organ"};
+  std::set<std::string> names;
+  if (scene->has_organ) names.insert("organ");
   for (StrictMap& entry : root->Maps("bodies", 0, kMostBodies)) {
     scene->bodies.push_back(ReadBody(entry, find));
     if (!names.insert(scene->bodies.back().name).second) entry.Fail("name", "is there twice");
+  }
+  const std::set<std::string> bodies = names;
+  names.insert("membrane");  // Of the organ, whether or not there is one.
+  for (StrictMap& entry : root->Maps("sheets", 0, kMaxSheets - 1)) {
+    const SheetSettings& sheet = scene->sheets.emplace_back(ReadSheet(entry));
+    if (!sheet.over.empty() && !bodies.contains(sheet.over)) {
+      entry.Fail("over", "'" + sheet.over + "' is no body of this scene");
+    }
+    if (!names.insert(sheet.name).second) entry.Fail("name", "is there twice");
   }
   for (StrictMap& entry : root->Maps("attach", 0, kMostAttachments)) {
     AttachSettings attach;
     attach.from = entry.Text("from", 31);
     attach.to = entry.Text("to", 31);
     for (const auto& [key, name] : {std::pair{"from", attach.from}, std::pair{"to", attach.to}}) {
-      if (!names.contains(name)) entry.Fail(key, "'" + name + "' is no body of this scene, nor `organ`");
+      if (!bodies.contains(name)) entry.Fail(key, "'" + name + "' is no body of this scene, nor `organ`");
     }
     if (attach.from == attach.to) entry.Fail("to", "must be another body");
     ReadSi(&entry, "reach_mm", Range::Between(0.1, 50), &attach.reach_m);

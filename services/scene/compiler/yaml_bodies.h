@@ -1,4 +1,4 @@
-// Reading the deformable bodies of a scene description: shapes, `bodies`, `attach`.
+// Reading the deformable bodies and sheets of a scene description: shapes, `bodies`, `sheets`, `attach`.
 #pragma once
 
 #include <filesystem>
@@ -23,7 +23,7 @@ ShapeSettings ReadShape(config::StrictMap map);
 /// Path of the file that a key names.
 using FindMesh = std::function<std::filesystem::path(const config::StrictMap&, const std::string& key)>;
 
-/// `bodies` and `attach` of a description.
+/// `bodies`, `sheets` and `attach` of a description, whose organ is known.
 void ReadBodies(config::StrictMap* root, const FindMesh& find, SceneSettings* scene);
 
 }  // namespace fulcrum::scene

@@ -18,6 +18,7 @@ SceneView SceneData::View() const {
   view.tube_surface = tube_surface;
   view.solids = solids;
   view.attachments = attachments;
+  view.sheets = sheets;
   view.surface_vertices = surface_vertices;
   view.surface_triangles = surface_triangles;
   view.membrane_material = membrane_material;

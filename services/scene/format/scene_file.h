@@ -11,7 +11,7 @@
 
 namespace fulcrum::scene {
 
-inline constexpr std::uint32_t kSceneFileVersion = 12;
+inline constexpr std::uint32_t kSceneFileVersion = 13;
 /// Version of what the content hash is taken of; another one changes the hash of every scene.
 inline constexpr std::uint32_t kSceneContentVersion = 11;
 
@@ -32,6 +32,7 @@ struct SceneData {
   std::vector<Triangle> tube_surface;
   std::vector<Solid> solids;
   std::vector<Attachment> attachments;
+  std::vector<SheetPart> sheets;
   std::vector<EmbeddedVertex> surface_vertices;
   std::vector<Triangle> surface_triangles;
   std::vector<Vec2f> membrane_material;

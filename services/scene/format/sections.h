@@ -5,11 +5,12 @@
 
 namespace fulcrum::scene {
 
-/// Those of scenes with several solids.
+/// Those of scenes with several bodies.
 template <class View, class Visitor>
 void ForEachBodySection(View& view, Visitor&& visit) {
   visit("solids", view.solids);
   visit("attachments", view.attachments);
+  visit("sheets", view.sheets);
 }
 
 /// Those of every scene.

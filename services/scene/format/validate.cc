@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "services/base/core/sheets.h"
 #include "services/base/core/solids.h"
 #include "services/scene/format/validate_checks.h"
 
@@ -13,6 +14,7 @@ void CheckAtlas(const SceneView& s) {
   const std::size_t rows = s.membrane.rows, cols = s.membrane.cols;
   for (std::size_t r = 0; r + 1 < rows; ++r) {
     for (std::size_t c = 0; c + 1 < cols; ++c) {
+      if (!HasCell(s, static_cast<Index>(r), static_cast<Index>(c))) continue;
       const std::size_t n = r * cols + c;
       for (const auto& [b, d] : {std::pair{n + 1, n + cols + 1}, std::pair{n + cols + 1, n + cols}}) {
         const Vec2f u = s.membrane_material[b] - s.membrane_material[n];
@@ -28,10 +30,12 @@ void CheckAtlas(const SceneView& s) {
 void CheckParticles(const SceneView& s) {
   const std::uint64_t nodes = static_cast<std::uint64_t>(s.membrane.rows) * s.membrane.cols;
   const std::uint64_t total = s.tube_vertex_count + nodes;
-  if (s.membrane.rows < 2 || s.membrane.cols < 2 || nodes > kMaxMembraneNodes || total > kMaxTissueVertices) {
+  const bool has_grid = s.membrane.rows >= 2 && s.membrane.cols >= 2;
+  const bool is_empty = s.membrane.rows == 0 && s.membrane.cols == 0;
+  if (!(has_grid || is_empty) || total == 0 || nodes > kMaxMembraneNodes || total > kMaxTissueVertices) {
     Fail("scene", s.tube_vertex_count, " organ vertices and ", s.membrane.rows, " x ", s.membrane.cols,
-         " membrane nodes; valid: at least 2 x 2, at most ", kMaxMembraneNodes, " nodes and ", kMaxTissueVertices,
-         " vertices");
+         " membrane nodes; valid: none or at least 2 x 2, at most ", kMaxMembraneNodes, " nodes and 1 to ",
+         kMaxTissueVertices, " vertices");
   }
   if (s.membrane.first != s.tube_vertex_count) {
     Fail("scene", "the membrane begins at particle ", s.membrane.first, "; valid: ", s.tube_vertex_count);
@@ -48,7 +52,41 @@ void CheckParticles(const SceneView& s) {
     CheckRange("membrane_material", "s", i, s.membrane_material[i].x(), 0, atlas);
     CheckRange("membrane_material", "t", i, s.membrane_material[i].y(), 0, atlas);
   }
-  CheckAtlas(s);
+}
+
+/// Each sheet a rectangle of the grid, with enough rows between two, and all that is outside of them fixed.
+void CheckSheets(const SceneView& s) {
+  if (s.sheets.size() > kMaxSheets) Fail("sheets", s.sheets.size(), " of them; valid: at most ", kMaxSheets);
+  std::uint64_t least = 0;
+  for (std::size_t i = 0; i < s.sheets.size(); ++i) {
+    const SheetPart& sheet = s.sheets[i];
+    if (std::memchr(sheet.name, 0, sizeof(sheet.name)) == nullptr) Fail("sheets", "element ", i, ": bad name");
+    const std::uint64_t end = static_cast<std::uint64_t>(sheet.first_row) + sheet.rows;
+    if (sheet.rows < 2 || sheet.cols < 2 || sheet.first_row < least || sheet.first_row % kRowsBetweenSheets != 0 ||
+        end > s.membrane.rows || sheet.cols > s.membrane.cols) {
+      Fail("sheets", "element ", i, ": ", sheet.rows, " x ", sheet.cols, " nodes from row ", sheet.first_row,
+           "; valid: at least 2 x 2 within ", s.membrane.rows, " x ", s.membrane.cols, ", from a multiple of ",
+           kRowsBetweenSheets, " and not below ", least);
+    }
+    if (sheet.over != kNoIndex) CheckIndex("sheets", i, sheet.over, 0, SolidCount(s));
+    least = end + kRowsBetweenSheets;
+  }
+  if (s.sheets.empty()) return;
+  const std::vector<std::uint8_t> absent = AbsentNodes(s);
+  for (std::size_t i = 0; i < absent.size(); ++i) {
+    if (absent[i] != 0 && s.inverse_mass[s.membrane.first + i] != 0) {
+      Fail("inverse_mass", "node ", i, " of the grid belongs to no sheet and is not fixed");
+    }
+  }
+  const auto of_sheet = [&](const char* section, std::size_t element, Index particle) {
+    if (particle >= s.membrane.first && particle < s.rest_position.size() && absent[particle - s.membrane.first] != 0) {
+      Fail(section, "element ", element, ": on a node of the grid that belongs to no sheet");
+    }
+  };
+  for (std::size_t i = 0; i < s.bindings.size(); ++i) of_sheet("bindings", i, s.bindings[i].membrane);
+  for (std::size_t i = 0; i < s.bending.size(); ++i) {
+    for (const Index v : s.bending[i].v) of_sheet("bending", i, v);
+  }
 }
 
 void CheckConstraints(const SceneView& s) {
@@ -75,9 +113,11 @@ void CheckConstraints(const SceneView& s) {
   CheckColours("tube_edge_colours", s.tube_edge_colours, s.tube_edges, total);
   const std::size_t rows = s.membrane.rows, cols = s.membrane.cols;
   CheckSize("membrane_rest_length", s.membrane_rest_length.size(), 3 * rows * cols);
+  const std::vector<std::uint8_t> absent = AbsentNodes(s);
   for (std::size_t i = 0; i < s.membrane_rest_length.size(); ++i) {
     const std::size_t r = i / 3 / cols, c = i / 3 % cols, k = i % 3;
-    const bool exists = (k == 0 || r + 1 < rows) && (k == 1 || c + 1 < cols);
+    const bool is_inside = (k == 0 || r + 1 < rows) && (k == 1 || c + 1 < cols);
+    const bool exists = is_inside && absent[i / 3] == 0 && absent[i / 3 + (k == 0 ? 1 : k == 1 ? cols : cols + 1)] == 0;
     CheckRange("membrane_rest_length", "rest length", i, s.membrane_rest_length[i], exists ? 1e-7 : 0,
                exists ? kFarthest_m : 0);
   }
@@ -292,7 +332,9 @@ std::optional<SceneFault> FindFault(const SceneView& scene) {
   try {
     CheckParameters(scene);
     CheckParticles(scene);
+    CheckSheets(scene);
     CheckConstraints(scene);
+    CheckAtlas(scene);
     CheckSurfaces(scene);
     CheckSolids(scene);
     CheckToolMeshes(scene);

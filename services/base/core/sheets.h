@@ -1,0 +1,60 @@
+// Which nodes and cells of the grid belong to a sheet.
+#pragma once
+
+#include <algorithm>
+#include <cstring>
+#include <vector>
+
+#include "services/base/core/scene_view.h"
+
+namespace fulcrum {
+
+inline constexpr std::size_t kMaxSheets = 16;
+/// Rows of the grid between two sheets. What looks at the neighbours of a node looks less far; and sheets begin at
+/// multiples of it, so that no block of rows lies in two of them.
+inline constexpr std::uint32_t kRowsBetweenSheets = 8;
+
+/// The sheets of a scene; of a scene that lists none the whole grid, if it has one.
+[[nodiscard]] inline std::vector<SheetPart> SheetsOf(const SheetScene& scene) {
+  if (!scene.sheets.empty()) return {scene.sheets.begin(), scene.sheets.end()};
+  if (scene.membrane.node_count() == 0) return {};
+  SheetPart whole{"membrane", 0, scene.membrane.rows, scene.membrane.cols, 0};
+  return {whole};
+}
+
+/// Whether cell (row, col) of the grid is part of a sheet. @pre row + 1 < rows, col + 1 < cols
+[[nodiscard]] inline bool HasCell(const SheetScene& scene, std::uint32_t row, std::uint32_t col) {
+  if (scene.sheets.empty()) return true;
+  return scene.membrane_rest_length[3 * (std::size_t{row} * scene.membrane.cols + col) + 2] > 0.0f;
+}
+
+/// The same of the cell of a triangle.
+[[nodiscard]] inline bool HasTriangle(const SheetScene& scene, Index triangle) {
+  const std::uint32_t cells = scene.membrane.cols - 1;
+  return HasCell(scene, triangle / 2 / cells, triangle / 2 % cells);
+}
+
+/// By row of the grid: which of SheetsOf it belongs to; a row between two belongs to the one before.
+[[nodiscard]] inline std::vector<std::size_t> SheetOfRows(const SheetScene& scene) {
+  const std::vector<SheetPart> sheets = SheetsOf(scene);
+  std::vector<std::size_t> of(scene.membrane.rows, 0);
+  for (std::uint32_t row = 0; row < scene.membrane.rows; ++row) {
+    of[row] = row > 0 ? of[row - 1] : 0;
+    if (of[row] + 1 < sheets.size() && row >= sheets[of[row] + 1].first_row) ++of[row];
+  }
+  return of;
+}
+
+/// By node: 1 where it belongs to no sheet.
+[[nodiscard]] inline std::vector<std::uint8_t> AbsentNodes(const SheetScene& scene) {
+  std::vector<std::uint8_t> absent(scene.membrane.node_count(), 1);
+  for (const SheetPart& sheet : SheetsOf(scene)) {
+    for (std::uint32_t row = 0; row < sheet.rows; ++row) {
+      const std::size_t first = std::size_t{sheet.first_row + row} * scene.membrane.cols;
+      std::fill_n(absent.begin() + static_cast<std::ptrdiff_t>(first), sheet.cols, std::uint8_t{0});
+    }
+  }
+  return absent;
+}
+
+}  // namespace fulcrum
