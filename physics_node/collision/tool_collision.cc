@@ -74,10 +74,15 @@ ToolCollision::ToolCollision(const TissueScene& scene, const TissueModel* model,
 Vec3f ToolCollision::PatchNormal(Index cell, bool previous) const {
   const GridLayout& layout = particles_->layout();
   const Index row = cell / (layout.cols - 1), col = cell % (layout.cols - 1);
-  const Index left = col > kPatchNodes ? col - kPatchNodes : 0,
-              right = std::min(col + kPatchNodes + 1, layout.cols - 1);
-  const Index top = row > kPatchNodes ? row - kPatchNodes : 0,
-              bottom = std::min(row + kPatchNodes + 1, layout.rows - 1);
+  // Up to the rim of the sheet.
+  const auto exists = [&](Index direction, Index r, Index c) {
+    return scene_.membrane_rest_length[3 * (r * layout.cols + c) + direction] > 0.0f;
+  };
+  Index left = col, right = col + 1, top = row, bottom = row + 1;
+  while (left > 0 && left + kPatchNodes > col && exists(0, row, left - 1)) --left;
+  while (right < col + kPatchNodes + 1 && exists(0, row, right)) ++right;
+  while (top > 0 && top + kPatchNodes > row && exists(1, top - 1, col)) --top;
+  while (bottom < row + kPatchNodes + 1 && exists(1, bottom, col)) ++bottom;
   // None beside a cut: the tissue beyond it moves independently, and flaps can turn over.
   const auto whole = [&](int direction, Index r, Index c) {
     return model_->rest(direction)[column_[c].base - column_[0].base + r * layout.stride] > 0.0f;

@@ -12,6 +12,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/base/core/sheets.h"
+
 namespace fulcrum::physics {
 namespace {
 
@@ -59,6 +61,10 @@ CauteryProbe::CauteryProbe(const TissueScene& scene, const TissueModel* model, c
 
 bool CauteryProbe::Tented(Index triangle, const std::array<float, 3>& barycentric) const {
   const auto nodes = model_->TriangleNodes(triangle);
+  for (const SheetPart& sheet : scene_.sheets) {
+    const std::uint32_t row = nodes[0] / model_->cols();
+    if (row >= sheet.first_row && row < sheet.first_row + sheet.rows && sheet.over == kNoIndex) return true;
+  }
   const Index first = scene_.membrane.first;
   std::array<Vec3f, 3> rest;
   Vec3f displacement = Vec3f::Zero();
@@ -217,6 +223,7 @@ bool CauteryProbe::FindCentre(float radius_m, float step_s, Vec2f* centre) {
 /// A triangle is divided into the parts that its dead edges leave; a cell belongs to the part whose own corners are
 /// nearest to it.
 void CauteryProbe::AddGaps(Index triangle, const MetalAxis& axis, float radius_m) {
+  if (!HasTriangle(scene_, triangle)) return;
   const MembraneTriangle t = MembraneTriangleAt(scene_.membrane.cols, triangle);
   const SheetAccess held{scene_, *model_, *particles_};
   const SlitSheet sheet(held);

@@ -100,7 +100,7 @@ ContactProbe::Motion ContactProbe::RingMotion(Index node) const {
                              {diagonal_dr, diagonal_dc}}) {
     if (row + r >= 0 && row + r < rows && col + c >= 0 && col + c < cols) {
       const auto at = static_cast<Index>((row + r) * cols + col + c);
-      if (model_->NodeAlive(at)) {
+      if (model_->NodeAlive(at) && !model_->IsAbsent(at)) {
         ring[count++] = scene_.membrane.first + at;
       }
     }

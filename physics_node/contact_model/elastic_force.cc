@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "services/base/core/sheets.h"
 #include "services/base/core/solids.h"
 
 namespace fulcrum::physics {
@@ -24,11 +25,13 @@ ElasticForce::ElasticForce(const TissueScene& scene, const TissueModel* model, c
   const auto x = [&](Index p) { return Vec3d(scene.rest_position[p].cast<double>()); };
   const Index first = scene.membrane.first, cols = scene.membrane.cols;
   membrane_stiffness_.assign(3 * std::size_t{scene.membrane.node_count()}, 0.0f);
-  double sheet_area = 0;
+  const std::vector<std::size_t> sheet = SheetOfRows(scene);
+  std::vector<double> sheet_area(sheet.empty() ? 0 : sheet.back() + 1);
   for (Index t = 0; t < scene.membrane.triangle_count(); ++t) {
+    if (!HasTriangle(scene, t)) continue;
     const auto n = model->TriangleNodes(t);
     const double area = 0.5 * (x(first + n[1]) - x(first + n[0])).cross(x(first + n[2]) - x(first + n[0])).norm();
-    sheet_area += area;
+    sheet_area[sheet[n[0] / cols]] += area;
     for (int i = 0; i < 3; ++i) {
       const Index a = std::min(n[i], n[(i + 1) % 3]), b = std::max(n[i], n[(i + 1) % 3]);
       const Index edge = 3 * a + (b - a == 1 ? 0u : b - a == cols ? 1u : 2u);
@@ -62,13 +65,18 @@ ElasticForce::ElasticForce(const TissueScene& scene, const TissueModel* model, c
   }
   if (!scene.bindings.empty()) {
     // Each binding is a column of fat with its share of the sheet as cross section and the mean length of all bindings.
-    double length = 0;
+    std::vector<double> length(sheet_area.size()), count(sheet_area.size());
     for (const Binding& binding : scene.bindings) {
-      length += binding.rest_length;
+      const std::size_t of = sheet[(binding.membrane - first) / cols];
+      length[of] += binding.rest_length;
+      count[of] += 1;
     }
-    const auto count = static_cast<double>(scene.bindings.size());
-    binding_stiffness_ = static_cast<float>(static_cast<double>(scene_.physics.fat_youngs_modulus_Pa) *
-                                            (sheet_area / count) / std::max(length / count, kLeastFatLength));
+    for (const std::size_t of : sheet) {
+      const double n = std::max(count[of], 1.0);
+      binding_stiffness_.push_back(
+          static_cast<float>(static_cast<double>(scene_.physics.fat_youngs_modulus_Pa) * (sheet_area[of] / n) /
+                             std::max(length[of] / n, kLeastFatLength)));
+    }
   }
 }
 
@@ -118,7 +126,8 @@ Vec3f ElasticForce::OnParticle(Index particle) const {
     }
   });
   if (membrane) {
-    if (const auto binding = model_->BindingOf(particle - scene_.membrane.first)) {
+    const Index node = particle - scene_.membrane.first;
+    if (const auto binding = model_->BindingOf(node)) {
       Vec3f foot = Vec3f::Zero();
       for (std::size_t i = 0; i < 3; ++i) {
         foot += binding->barycentric[i] * particles_->At(binding->surface[i]);
@@ -126,7 +135,7 @@ Vec3f ElasticForce::OnParticle(Index particle) const {
       const Vec3f d = foot - here;
       const float length = d.norm();
       if (length > 0.0f) {
-        force += (binding_stiffness_ * (length - binding->rest_length) / length) * d;
+        force += (binding_stiffness_[node / scene_.membrane.cols] * (length - binding->rest_length) / length) * d;
       }
     }
   }

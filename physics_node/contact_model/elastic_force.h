@@ -46,7 +46,7 @@ class ElasticForce {
   std::vector<float> membrane_stiffness_;  ///< [3 * nodes], N/m.
   std::vector<Index> tube_start_;
   std::vector<TubeEdge> tube_edges_;
-  float binding_stiffness_ = 0;  ///< [N/m]
+  std::vector<float> binding_stiffness_;  ///< By row of the membrane [N/m].
 };
 
 }  // namespace fulcrum::physics

@@ -7,6 +7,7 @@
 
 #include "physics_node/collision/closest.h"
 #include "physics_node/simd/limits.h"
+#include "services/base/core/sheets.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -93,6 +94,7 @@ void SheetWalk::ForTrianglesAround(Index cell, const Visit& visit) const {
   }
   for (Index r = r0; r <= r1; ++r) {
     for (Index c = c0; c <= c1; ++c) {
+      if (!HasCell(scene_, r, c)) continue;
       const Index n00 = r * scene_.membrane.cols + c, n10 = n00 + scene_.membrane.cols,
                   at = kSide * (r - r0) + (c - c0);
       const Index triangle = 2 * (r * cells + c);

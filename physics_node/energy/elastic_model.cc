@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/base/core/sheets.h"
 #include "services/base/core/solids.h"
 
 namespace fulcrum::physics {
@@ -57,13 +58,15 @@ void AddSprings(const TissueScene& scene, ElasticModel* model) {
     }
     return width;
   };
-  std::array<double, 3> mean{}, count{};
+  const std::vector<std::size_t> sheet = SheetOfRows(scene);
+  std::vector<std::array<double, 3>> means(sheet.empty() ? 0 : sheet.back() + 1), counts(means.size());
   for (std::size_t i = 0; i < scene.membrane_rest_length.size(); ++i) {
-    mean[i % 3] += static_cast<double>(scene.membrane_rest_length[i]);
-    count[i % 3] += scene.membrane_rest_length[i] > 0.0f ? 1 : 0;
+    const std::size_t of = sheet[i / 3 / cols];
+    means[of][i % 3] += static_cast<double>(scene.membrane_rest_length[i]);
+    counts[of][i % 3] += scene.membrane_rest_length[i] > 0.0f ? 1 : 0;
   }
-  for (std::size_t d = 0; d < 3; ++d) {
-    mean[d] /= std::max(count[d], 1.0);
+  for (std::size_t of = 0; of < means.size(); ++of) {
+    for (std::size_t d = 0; d < 3; ++d) means[of][d] /= std::max(counts[of][d], 1.0);
   }
   for (Index row = 0; row < rows; ++row) {
     for (Index col = 0; col < cols; ++col) {
@@ -73,7 +76,7 @@ void AddSprings(const TissueScene& scene, ElasticModel* model) {
         if (!(rest > 0)) {
           continue;
         }
-        const double whole = kLeastEdge * mean[static_cast<std::size_t>(d)];
+        const double whole = kLeastEdge * means[sheet[row]][static_cast<std::size_t>(d)];
         ElasticSpring& spring = model->springs[3 * node + static_cast<Index>(d)];
         spring.a = first + node;
         spring.b = first + node + (d == 0 ? 1 : d == 1 ? cols : cols + 1);
@@ -91,6 +94,7 @@ void AddTriangles(const TissueScene& scene, ElasticModel* model) {
   const Index rows = scene.membrane.rows, cols = scene.membrane.cols;
   for (Index row = 0; row + 1 < rows; ++row) {
     for (Index col = 0; col + 1 < cols; ++col) {
+      if (!HasCell(scene, row, col)) continue;
       const std::size_t n = row * cols + col;
       for (const bool lower : {false, true}) {
         ElasticTriangle triangle;
@@ -157,23 +161,8 @@ void AddBindings(const TissueScene& scene, ElasticModel* model) {
   if (scene.bindings.empty()) {
     return;
   }
-  // Each binding is a column of fat with its share of the sheet as cross section and the mean length of all bindings.
-  double area = 0, length = 0;
-  const Index first = scene.membrane.first, cols = scene.membrane.cols;
-  for (Index row = 0; row + 1 < scene.membrane.rows; ++row) {
-    for (Index col = 0; col + 1 < cols; ++col) {
-      const Index n = first + row * cols + col;
-      const Vec3d diagonal = Rest(scene, n + cols + 1) - Rest(scene, n);
-      area += 0.5 * diagonal.cross(Rest(scene, n + 1) - Rest(scene, n)).norm() +
-              0.5 * diagonal.cross(Rest(scene, n + cols) - Rest(scene, n)).norm();
-    }
-  }
-  for (const Binding& binding : scene.bindings) {
-    length += binding.rest_length;
-  }
-  const auto count = static_cast<double>(scene.bindings.size());
-  const double stiffness =
-      scene.physics.fat_youngs_modulus_Pa * (area / count) / std::max(length / count, kLeastBindingLength);
+  const std::vector<double> stiffness = BindingStiffness(scene);
+  const std::vector<std::size_t> sheet = SheetOfRows(scene);
   for (const Binding& binding : scene.bindings) {
     ElasticBinding b;
     b.membrane = binding.membrane;
@@ -182,7 +171,7 @@ void AddBindings(const TissueScene& scene, ElasticModel* model) {
       b.barycentric[i] = binding.barycentric[i];
     }
     b.rest_length = binding.rest_length;
-    b.stiffness = stiffness;
+    b.stiffness = stiffness[sheet[(binding.membrane - scene.membrane.first) / scene.membrane.cols]];
     model->bindings.push_back(b);
   }
 }
@@ -233,6 +222,33 @@ void AddLoad(ElasticModel* model) {
 }
 
 }  // namespace
+
+std::vector<double> BindingStiffness(const TissueScene& scene) {
+  const std::vector<std::size_t> sheet = SheetOfRows(scene);
+  const std::size_t sheets = sheet.empty() ? 0 : sheet.back() + 1;
+  std::vector<double> area(sheets), length(sheets), count(sheets), stiffness;
+  const Index first = scene.membrane.first, cols = scene.membrane.cols;
+  for (Index row = 0; row + 1 < scene.membrane.rows; ++row) {
+    for (Index col = 0; col + 1 < cols; ++col) {
+      if (!HasCell(scene, row, col)) continue;
+      const Index n = first + row * cols + col;
+      const Vec3d diagonal = Rest(scene, n + cols + 1) - Rest(scene, n);
+      area[sheet[row]] += 0.5 * diagonal.cross(Rest(scene, n + 1) - Rest(scene, n)).norm() +
+                          0.5 * diagonal.cross(Rest(scene, n + cols) - Rest(scene, n)).norm();
+    }
+  }
+  for (const Binding& binding : scene.bindings) {
+    const std::size_t of = sheet[(binding.membrane - first) / cols];
+    length[of] += binding.rest_length;
+    count[of] += 1;
+  }
+  for (std::size_t of = 0; of < sheets; ++of) {
+    const double n = std::max(count[of], 1.0);
+    stiffness.push_back(scene.physics.fat_youngs_modulus_Pa * (area[of] / n) /
+                        std::max(length[of] / n, kLeastBindingLength));
+  }
+  return stiffness;
+}
 
 std::vector<std::vector<std::size_t>> TrianglesOfEdges(const ElasticModel& model) {
   std::vector<std::vector<std::size_t>> of(model.springs.size());

@@ -135,6 +135,10 @@ struct ElasticModel {
 /// membrane_model continuum.
 [[nodiscard]] ElasticModel BuildElasticModel(const TissueScene& scene);
 
+/// Stiffness of the bindings by sheet [N/m]: each is a column of fat with its share of the sheet as cross section and
+/// the mean length of the sheet's bindings.
+[[nodiscard]] std::vector<double> BindingStiffness(const TissueScene& scene);
+
 /// Triangles that an edge is in, up to two; less at the rim.
 [[nodiscard]] std::vector<std::vector<std::size_t>> TrianglesOfEdges(const ElasticModel& model);
 

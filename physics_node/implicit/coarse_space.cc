@@ -6,7 +6,7 @@
 #include <map>
 #include <set>
 
-#include "physics_node/implicit/coarse_row.h"
+#include "services/base/core/sheets.h"
 #include "services/base/core/solids.h"
 
 namespace fulcrum::physics::implicit {
@@ -15,17 +15,11 @@ namespace {
 /// Coarse nodes over the membrane. With those of the lattice they are some 250 in built-in, so the factor has some 750
 /// rows. Assumed.
 constexpr int kCoarseRows = 9, kCoarseColumns = 4;
+/// Of several sheets the longest has as many rows, the others fewer in proportion, but not less than this.
+constexpr int kLeastCoarseRows = 3;
 /// Distance of the nodes of the lattice over a single organ [m]: the outer radius of built-in. With 30 mm the organ's
 /// ovalling, which is soft, converges slowly (deploy/docs/measurements/physics, Lattice over the organ).
 constexpr double kLattice_m = 0.018;
-/// Rows of the membrane, and afterwards columns of blocks of the factor, that one step adds to the next matrix.
-/// Complete every 60 steps instead of every 30, the error of a pull was two thirds larger
-/// (deploy/docs/measurements/physics).
-constexpr int kRowsPerStep = 14, kFactorColumnsPerStep = 4;
-/// Part of the mean diagonal that is added to it: nodes of little support must not make the matrix singular. Some
-/// hundred times the rounding of a float. Assumed.
-constexpr float kRegularisation = 1e-5f;
-
 /// Memory is reserved for so many contacts with tools, all that two tools can have, and for so many hats
 /// around the edits of a step, eight an edit; with more the lists grow.
 constexpr std::size_t kReservedStiffContacts = 2048, kReservedEdits = 8192;
@@ -71,10 +65,14 @@ CoarseSpace::CoarseSpace(const TissueScene& scene, const ElasticModel& model, co
       sheet_rows_(static_cast<int>(scene.membrane.rows)) {
   const int cols = static_cast<int>(layout_.cols);
   grid_.columns = std::min(kCoarseColumns, cols);
-  grid_.rows = std::min(kCoarseRows, sheet_rows_);
-  grid_.row_place = Spread<CellPlace>(sheet_rows_, grid_.rows);
   grid_.column_place = Spread<CellPlace>(cols, grid_.columns);
+  PlaceCoarseRows(scene);
   BuildHats();
+  // The blocks of hats at the rim of a sheet hold what edges there are.
+  for (Index edge = 0; !scene.sheets.empty() && edge < scene.membrane_rest_length.size(); ++edge) {
+    const Index row = edge / 3 / layout_.cols, col = edge / 3 % layout_.cols;
+    if (!(scene.membrane_rest_length[edge] > 0.0f)) MarkEdit(row, col, edge % 3);
+  }
   BuildLattice(scene, model);
   const Eigen::Index n = 3 * grid_.nodes;
   matrix_.constant = Eigen::MatrixXf::Zero(n, n);
@@ -83,6 +81,36 @@ CoarseSpace::CoarseSpace(const TissueScene& scene, const ElasticModel& model, co
   AddTubeMass(model);
   AddTube(model);
   AddBindings(model, particles);
+}
+
+/// Each sheet has coarse rows of its own, so that a correction of one does not move another. Rows of no sheet continue
+/// those of the sheet before them: hats, which are linear between their centres, can end there.
+void CoarseSpace::PlaceCoarseRows(const TissueScene& scene) {
+  const std::vector<SheetPart> sheets = SheetsOf(scene);
+  std::uint32_t longest = 0;
+  for (const SheetPart& sheet : sheets) longest = std::max(longest, sheet.rows);
+  for (const SheetPart& sheet : sheets) {
+    const auto rows = static_cast<int>(sheet.rows);
+    const int share = static_cast<int>(std::lround(1.0 * kCoarseRows * sheet.rows / longest));
+    const int count = std::min(std::max(share, kLeastCoarseRows), rows);
+    std::vector<CellPlace> place = Spread<CellPlace>(rows, count);
+    const float step = count > 1 ? static_cast<float>(count - 1) / static_cast<float>(rows - 1) : 0.0f;
+    while (grid_.row_place.size() < sheet.first_row) {
+      CellPlace next = grid_.row_place.back();
+      next.fraction += grid_.row_step.back();
+      grid_.row_place.push_back(next);
+      grid_.row_step.push_back(grid_.row_step.back());
+    }
+    for (int row = 0; row < rows; ++row) {
+      place[static_cast<std::size_t>(row)].cell += grid_.rows;
+      grid_.row_place.push_back(place[static_cast<std::size_t>(row)]);
+      grid_.row_step.push_back(step);
+    }
+    for (int i = 0; i < count; ++i) {
+      grid_.row_at.push_back(static_cast<int>(sheet.first_row) + i * (rows - 1) / std::max(count - 1, 1));
+    }
+    grid_.rows += count;
+  }
 }
 
 void CoarseSpace::BuildHats() {
@@ -247,7 +275,7 @@ void CoarseSpace::BuildLattice(const TissueScene& scene, const ElasticModel& mod
   std::vector<Vec3d> place;
   for (int i = 0; i < grid_.rows; ++i) {
     for (int j = 0; j < grid_.columns; ++j) {
-      const int row = i * (sheet_rows_ - 1) / std::max(grid_.rows - 1, 1),
+      const int row = grid_.row_at[static_cast<std::size_t>(i)],
                 column = j * (static_cast<int>(layout_.cols) - 1) / std::max(grid_.columns - 1, 1);
       place.push_back(model.rest_position[scene.membrane.first + static_cast<Index>(row) * layout_.cols +
                                           static_cast<Index>(column)]);
@@ -375,89 +403,6 @@ void CoarseSpace::AddBindings(const ElasticModel& model, const ParticleStore& pa
       AddWeights(model, particles, attachment.v[i], attachment.c[i], &weights);
     }
     add(attachment.stiffness * Mat3d::Identity());
-  }
-}
-
-void CoarseSpace::AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int row) {
-  const std::size_t stride = layout_.stride, start = static_cast<std::size_t>(row) * stride;
-  const std::uint32_t cols = layout_.cols;
-  const auto value = [&](const float* plane, std::uint32_t col) { return plane[start + layout_.Offset(0, col)]; };
-  const CellPlace here = grid_.row_place[static_cast<std::size_t>(row)];
-  const float next_row = row + 1 < sheet_rows_ && grid_.rows > 1
-                             ? here.fraction + static_cast<float>(grid_.rows - 1) / static_cast<float>(sheet_rows_ - 1)
-                             : here.fraction;
-  const float column_step =
-      grid_.columns > 1 ? static_cast<float>(grid_.columns - 1) / static_cast<float>(cols - 1) : 0.0f;
-  CoarseRow sums(here.fraction, next_row, column_step, &matrix_.next);
-  int cell = 0;
-  sums.Begin(grid_.NodesOf(here.cell, cell));
-  for (std::uint32_t col = 0; col < cols; ++col) {
-    const CellPlace at = grid_.column_place[col];
-    if (at.cell != cell) {
-      sums.End();
-      cell = at.cell;
-      sums.Begin(grid_.NodesOf(here.cell, cell));
-    }
-    const bool moves = value(sheet.w, col) > 0.0f;
-    if (moves) {
-      const float mass = value(sheet.mass, col) * inertia;
-      sums.Add(CoarseRow::kMass, {mass, mass, mass, 0, 0, 0}, at.fraction);
-    }
-    for (std::size_t d = 0; d < 3; ++d) {
-      const std::size_t down = d != 0 ? stride : 0;
-      const std::uint32_t to = d != 1 ? col + 1 : col;
-      if (to >= cols || (down && row + 1 >= sheet_rows_) || !(value(sheet.whole[d], col) > 0.0f)) {
-        continue;
-      }
-      float e[3];
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const float* x = matrix.point[axis] + start;
-        e[axis] = x[down + layout_.Offset(0, to)] - x[layout_.Offset(0, col)];
-      }
-      const float k = value(matrix.kt[d], col), along = value(matrix.along[d], col);
-      const Symmetric element{k + along * e[0] * e[0], k + along * e[1] * e[1], k + along * e[2] * e[2],
-                              along * e[0] * e[1],     along * e[0] * e[2],     along * e[1] * e[2]};
-      const bool far_moves = sheet.w[start + down + layout_.Offset(0, to)] > 0.0f;
-      if (moves && far_moves) {
-        sums.Add(d, element, at.fraction);
-      } else if (moves) {
-        sums.AddNearEnd(element, at.fraction);
-      } else if (far_moves) {
-        sums.AddFarEnd(d, element, at.fraction);
-      }
-    }
-  }
-  sums.End();
-}
-
-void CoarseSpace::AddRows(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int rows) {
-  if (matrix_.next_row == 0) {
-    matrix_.next = matrix_.constant + inertia * matrix_.tube_mass;
-  }
-  for (const int end = std::min(matrix_.next_row + rows, sheet_rows_); matrix_.next_row < end; ++matrix_.next_row) {
-    AddSheetRow(sheet, matrix, inertia, matrix_.next_row);
-  }
-  matrix_.complete = matrix_.next_row == sheet_rows_;
-  if (matrix_.complete) {
-    matrix_.next_row = 0;
-    matrix_.next.diagonal().array() += kRegularisation * matrix_.next.diagonal().mean();
-  }
-}
-
-void CoarseSpace::Assemble(const Sheet& sheet, const SheetMatrix& matrix, float inertia) {
-  matrix_.next_row = 0;
-  AddRows(sheet, matrix, inertia, sheet_rows_);
-  (void)matrix_.factor.Take(kernels_, matrix_.next);
-  matrix_.complete = false;
-}
-
-void CoarseSpace::AssembleNextPart(const Sheet& sheet, const SheetMatrix& matrix, float inertia) {
-  if (matrix_.complete) {
-    // When it is refused, the last factor stays in force.
-    matrix_.complete =
-        matrix_.factor.Continue(kernels_, matrix_.next, kFactorColumnsPerStep) == CoarseFactor::Progress::kMore;
-  } else {
-    AddRows(sheet, matrix, inertia, kRowsPerStep);
   }
 }
 

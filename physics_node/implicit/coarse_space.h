@@ -111,6 +111,8 @@ class CoarseSpace {
   struct CoarseGrid {
     int columns = 0, rows = 0, nodes = 0;
     std::vector<CellPlace> row_place, column_place;  ///< By row and by column of the membrane.
+    std::vector<float> row_step;                     ///< By row: the part of a coarse cell between it and the next row.
+    std::vector<int> row_at;                         ///< By coarse row: its row of the membrane.
     FloatArray column_share;  ///< [columns][width], part of a coarse column in a float of a row of hats.
     std::vector<LatticePlace> tube_weights;
     std::vector<int> body;  ///< By node, as Partition::BodyOf.
@@ -140,6 +142,7 @@ class CoarseSpace {
   static std::size_t GroupOf(int body, std::size_t bodies) {
     return body > 0 ? static_cast<std::size_t>(body) - 1 : bodies - 1;
   }
+  void PlaceCoarseRows(const TissueScene& scene);
   void BuildHats();
   struct Lattice;
   static Lattice LatticeOf(const Solid& solid, std::size_t solids, const ElasticModel& model);

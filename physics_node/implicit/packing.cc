@@ -214,6 +214,7 @@ SolverState::SolverState(const TissueScene& scene, const ElasticModel& elastic, 
     displacement = FloatArray(context.model.layout.floats);
   }
   elements.UpdateTopology(tissue);
+  coarse.ScaleHats(edges.View(context.particles.plane(3)));
 }
 
 KrylovVectors::KrylovVectors(const FieldLayout& layout)

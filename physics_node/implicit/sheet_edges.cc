@@ -88,12 +88,13 @@ void SheetEdges::Update(const TissueModel& tissue, Index row, Index col, std::si
   }
 }
 
-/// The two triangles of an edge; none beyond the rim.
+/// The two triangles of an edge; none beyond the rim of its sheet.
 std::array<std::optional<SheetEdges::TrianglePlace>, 2> SheetEdges::TrianglesOf(Index row, Index col,
                                                                                 std::size_t direction) const {
   const auto place = [&](bool exists, Index r, Index c, std::size_t half) {
-    return exists && r + 1 < model_.grid.rows && c + 1 < model_.grid.cols ? std::optional(TrianglePlace{r, c, half})
-                                                                          : std::nullopt;
+    const bool is_cell = exists && r + 1 < model_.grid.rows && c + 1 < model_.grid.cols &&
+                         model_.sheet.axial[2][model_.grid.Offset(r, c)] > 0.0f;
+    return is_cell ? std::optional(TrianglePlace{r, c, half}) : std::nullopt;
   };
   switch (direction) {
     case 0:

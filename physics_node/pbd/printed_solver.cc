@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "physics_node/pbd/printed_formulas.h"
+#include "services/base/core/sheets.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -61,6 +62,7 @@ PrintedSolver::PrintedSolver(const TissueScene& scene, const TissueModel* model,
 void PrintedSolver::FindLinks(const TissueScene& scene) {
   std::vector<Triangle> sheet;
   for (Index t = 0; t < scene.membrane.triangle_count(); ++t) {
+    if (!HasTriangle(scene, t)) continue;
     const std::array<Index, 3> nodes = model_->TriangleNodes(t);
     sheet.push_back({first_node_ + nodes[0], first_node_ + nodes[1], first_node_ + nodes[2]});
   }
@@ -73,6 +75,7 @@ void PrintedSolver::FindLinks(const TissueScene& scene) {
     }
   }
   for (Index node = 0; node < scene.membrane.node_count(); ++node) {
+    if (model_->IsAbsent(node)) continue;
     const Index particle = first_node_ + node;
     const printed::Vec p = scene.rest_position[particle].cast<double>(), n = of_sheet[particle].cast<double>();
     double least = std::numeric_limits<double>::infinity();

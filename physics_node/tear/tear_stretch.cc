@@ -144,11 +144,12 @@ const float* TearWatch::FilteredRow(std::uint32_t row) {
       line_[5 * n + c] += rest_.rr[half][first + c];
     }
   }
+  const std::vector<float>& by_cols = scales_[sheet_of_[row]].by_cols;
   for (std::size_t k = 0; k < kSums; ++k) {
     const float* in = &line_[k * n];
     float* sum = out + k * n;
-    for (std::size_t i = 0; i < weight_col_.size(); ++i) {
-      const float w = weight_col_[i];
+    for (std::size_t i = 0; i < by_cols.size(); ++i) {
+      const float w = by_cols[i];
       for (std::size_t c = 0; c + i < cells; ++c) sum[c] += w * in[c + i];  // Cell to the right of node c.
       for (std::size_t c = i + 1; c < n; ++c) sum[c] += w * in[c - 1 - i];  // Cell to its left.
     }
@@ -158,11 +159,14 @@ const float* TearWatch::FilteredRow(std::uint32_t row) {
 
 std::array<float, TearWatch::kSums> TearWatch::SumsAt(std::uint32_t row, std::uint32_t col) {
   std::array<float, kSums> sum{};
-  for (std::uint32_t i = 0; i < weight_row_.size(); ++i) {
+  const std::vector<float>& by_rows = scales_[sheet_of_[row]].by_rows;
+  for (std::uint32_t i = 0; i < by_rows.size(); ++i) {
     for (int side = 0; side < 2; ++side) {
       if (side == 0 ? row + i + 1 >= rows_ : row < i + 1) continue;
-      const float* in = FilteredRow(side == 0 ? row + i : row - 1 - i);
-      for (std::size_t k = 0; k < kSums; ++k) sum[k] += weight_row_[i] * in[k * cols_ + col];
+      const std::uint32_t other = side == 0 ? row + i : row - 1 - i;
+      if (sheet_of_[other] != sheet_of_[row]) continue;
+      const float* in = FilteredRow(other);
+      for (std::size_t k = 0; k < kSums; ++k) sum[k] += by_rows[i] * in[k * cols_ + col];
     }
   }
   return sum;

@@ -14,6 +14,7 @@
 #include <cmath>
 #include <utility>
 
+#include "services/base/core/sheets.h"
 namespace fulcrum::physics {
 namespace {
 
@@ -60,20 +61,8 @@ TearWatch::TearWatch(const TissueScene& scene, const TissueModel* model, const P
     }
   }
   const Index triangles = 2 * (rows_ - 1) * (cols_ - 1);
-  double area = 0, length[2] = {0, 0}, count[2] = {0, 0};
-  for (Index t = 0; t < triangles; ++t) {
-    const Metric g = RestMetric(t);
-    area += 0.5 * std::sqrt(std::max(0.0, static_cast<double>(g.cc) * static_cast<double>(g.rr) -
-                                              static_cast<double>(g.cr) * static_cast<double>(g.cr)));
-  }
-  least_area_ = kLeastAreaShare * static_cast<float>(area / triangles);
-  for (std::size_t e = 0; e < scene.membrane_rest_length.size(); ++e) {
-    if (e % 3 == 2 || !(scene.membrane_rest_length[e] > 0.0f)) continue;
-    length[e % 3] += static_cast<double>(scene.membrane_rest_length[e]);
-    count[e % 3] += 1;
-  }
-  weight_col_ = Window(kSmoothing_m * static_cast<float>(count[0] / length[0]));
-  weight_row_ = Window(kSmoothing_m * static_cast<float>(count[1] / length[1]));
+  sheet_of_ = SheetOfRows(scene);
+  MeasureSheets();
   cell_rows_.stretch2.assign(rows_ - 1, 0.0f);
   cell_rows_.moved.assign(rows_ - 1, kForceEvaluation);
   cell_rows_.gain.assign(rows_ - 1, 0.0f);
@@ -87,6 +76,32 @@ TearWatch::TearWatch(const TissueScene& scene, const TissueModel* model, const P
   for (Index t = 0; t < triangles; ++t) RefreshTriangle(t);
 }
 
+void TearWatch::MeasureSheets() {
+  struct Sums {
+    double area = 0, triangles = 0, length[2] = {0, 0}, count[2] = {0, 0};
+  };
+  std::vector<Sums> sums(sheet_of_.back() + 1);
+  for (Index t = 0; t < scene_.membrane.triangle_count(); ++t) {
+    if (!HasTriangle(scene_, t)) continue;
+    Sums& of = sums[sheet_of_[t / 2 / (cols_ - 1)]];
+    const Metric g = RestMetric(t);
+    of.area += 0.5 * std::sqrt(std::max(0.0, static_cast<double>(g.cc) * static_cast<double>(g.rr) -
+                                                 static_cast<double>(g.cr) * static_cast<double>(g.cr)));
+    of.triangles += 1;
+  }
+  for (std::size_t e = 0; e < scene_.membrane_rest_length.size(); ++e) {
+    if (e % 3 == 2 || !(scene_.membrane_rest_length[e] > 0.0f)) continue;
+    Sums& of = sums[sheet_of_[e / 3 / cols_]];
+    of.length[e % 3] += static_cast<double>(scene_.membrane_rest_length[e]);
+    of.count[e % 3] += 1;
+  }
+  for (const Sums& of : sums) {
+    scales_.push_back({kLeastAreaShare * static_cast<float>(of.area / of.triangles),
+                       Window(kSmoothing_m * static_cast<float>(of.count[0] / of.length[0])),
+                       Window(kSmoothing_m * static_cast<float>(of.count[1] / of.length[1]))});
+  }
+}
+
 void TearWatch::RefreshTriangle(Index triangle) {
   const std::size_t half = triangle % 2;
   const Index cell = triangle / 2;
@@ -95,7 +110,8 @@ void TearWatch::RefreshTriangle(Index triangle) {
   if (model_->TriangleAlive(triangle)) {
     const Metric g = RestMetric(triangle);
     const float det = g.cc * g.rr - g.cr * g.cr;
-    if (det > 4.0f * least_area_ * least_area_) {  // Area = sqrt(det) / 2.
+    const float least_area = scales_[sheet_of_[cell / (cols_ - 1)]].least_area;
+    if (det > 4.0f * least_area * least_area) {  // Area = sqrt(det) / 2.
       rest = g;
       inverse = {g.rr / det, -g.cr / det, g.cc / det};
     }
@@ -186,11 +202,11 @@ bool TearWatch::Evaluate(std::uint64_t step) {
     }
   }
   // Nodes of the rows near the limit, and those of the most stretched one.
-  const auto reach = static_cast<std::uint32_t>(weight_row_.size());
   std::uint32_t worst_row = 0, worst_col = 0, done = 0;
   largest_ = 0;
   for (std::uint32_t row = 0; row + 1 < rows_; ++row) {
     if (row != largest_row && !(cell_rows_.stretch2[row] >= near2)) continue;
+    const auto reach = static_cast<std::uint32_t>(scales_[sheet_of_[row]].by_rows.size());
     const std::uint32_t end = std::min(row + reach + 1, rows_);
     for (std::uint32_t r = std::max(done, row + 1 > reach ? row + 1 - reach : 0); r < end; ++r) {
       SmoothRow(r);

@@ -119,11 +119,17 @@ class TearWatch {
     std::array<std::vector<float>, 2> cc, cr, rr;
   };
   MetricPlanes inverse_;  ///< Inverse of the rest metric [1/m^2]; 0 where the triangle is dead, debris, or below
-                          ///< least_area_.
+                          ///< Scale::least_area.
   MetricPlanes rest_;     ///< The rest metric [m^2]; 0 likewise.
-  float least_area_ = 0;  ///< Least area of a triangle at rest [m^2].
-  std::vector<float> weight_col_, weight_row_;  ///< Weight of the n-th cell beside a node.
-  std::vector<Index> bare_edges_;               ///< Edges without a living triangle.
+  /// Of a sheet, from the size of its cells.
+  struct Scale {
+    float least_area = 0;                 ///< Least area of a triangle at rest [m^2].
+    std::vector<float> by_cols, by_rows;  ///< Weight of the n-th cell beside a node.
+  };
+  void MeasureSheets();
+  std::vector<Scale> scales_;
+  std::vector<std::size_t> sheet_of_;  ///< By row.
+  std::vector<Index> bare_edges_;      ///< Edges without a living triangle.
 
   /// By row of cells.
   struct CellRows {

@@ -58,7 +58,7 @@ void TissueModel::FindDebris(const std::vector<Index>& changed, ParticleStore* p
       continue;
     }
     for (const Index node : piece_) {
-      debris_[node] = 1;
+      debris_[node] = kDebris;
       particles->SetInverseMass(particles->Ref(scene_.membrane.first + node), 0.0f);
     }
     for (const Index node : piece_) {
@@ -69,7 +69,7 @@ void TissueModel::FindDebris(const std::vector<Index>& changed, ParticleStore* p
 
 void TissueModel::ClearDebris(ParticleStore* particles) {
   for (Index node = 0; node < debris_.size(); ++node) {
-    if (debris_[node] != 0) {
+    if (debris_[node] == kDebris) {
       debris_[node] = 0;
       particles->SetInverseMass(particles->Ref(scene_.membrane.first + node),
                                 BaseInverseMass(scene_.membrane.first + node));

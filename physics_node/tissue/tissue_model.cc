@@ -1,6 +1,7 @@
 #include "physics_node/tissue/tissue_model.h"
 
 #include "services/base/core/error.h"
+#include "services/base/core/sheets.h"
 #include "services/base/core/slit_sheet.h"
 
 namespace fulcrum::physics {
@@ -17,7 +18,8 @@ TissueModel::TissueModel(const TissueScene& scene, ParticleStore* particles)
   dead_nodes_.assign((nodes + 7) / 8, 0);
   dead_edges_.assign((3 * nodes + 7) / 8, 0);
   shrink_.assign(3 * nodes, 0);
-  debris_.assign(nodes, 0);
+  debris_ = AbsentNodes(scene);
+  for (std::uint8_t& node : debris_) node = node != 0 ? kAbsent : 0;
   visited_.assign(nodes, 0);
   triangle_alive_.assign(scene.membrane.triangle_count(), 1);
   for (int d = 0; d < 3; ++d) {

@@ -58,8 +58,10 @@ class TissueModel {
   [[nodiscard]] std::uint32_t rows() const { return scene_.membrane.rows; }
   [[nodiscard]] std::uint32_t cols() const { return scene_.membrane.cols; }
   [[nodiscard]] bool NodeAlive(Index node) const { return !TestBit(dead_nodes_, node); }
-  /// Belongs to a small piece without an anchor, which is frozen in place and excluded from all computations.
+  /// Belongs to a small piece without an anchor, which is frozen in place and excluded from all computations, or to no
+  /// sheet.
   [[nodiscard]] bool IsDebris(Index node) const { return debris_[node] != 0; }
+  [[nodiscard]] bool IsAbsent(Index node) const { return debris_[node] == kAbsent; }
   /// The edge exists in the grid, and neither it nor one of its ends is cut.
   [[nodiscard]] bool EdgeAlive(Index node, int direction) const;
   /// Triangle 2 * cell + half: its nodes and edges are alive, and it is not debris.
@@ -112,7 +114,9 @@ class TissueModel {
   };
   std::vector<Patch> bending_patch_;  ///< By batch * 8 + lane.
 
-  std::vector<std::uint8_t> dead_nodes_, dead_edges_, shrink_, triangle_alive_, debris_;
+  std::vector<std::uint8_t> dead_nodes_, dead_edges_, shrink_, triangle_alive_;
+  static constexpr std::uint8_t kDebris = 1, kAbsent = 2;
+  std::vector<std::uint8_t> debris_;          ///< By node; 0: tissue.
   std::vector<Index> changed_nodes_, piece_;  ///< Scratch of Apply.
   std::vector<Index> edited_edges_;
   std::vector<std::uint32_t> visited_;  ///< Scratch: by node, the last search that reached it.

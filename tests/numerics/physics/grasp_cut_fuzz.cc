@@ -37,7 +37,7 @@ scene::SceneData TinyScene(bool two_graspers, bool several_solids) {
   if (two_graspers) {
     settings.tools[1] = scene::DefaultTool(ToolKind::kGrasper, settings.tools[1].p_WP);
   }
-  return several_solids ? WithSolids(settings, {0.036, -0.02, 0.02}, true, kStrand_Pa)
+  return several_solids ? WithSolids(settings, {0.036, -0.02, 0.02}, true, kStrand_Pa, true)
                         : scene::BuildProcedural(settings);
 }
 
@@ -126,7 +126,7 @@ void GraspCutFuzz::Publish() {
   Index debris = 0;
   simulation_->ApplyTopology(topology_);
   for (Index node = 0; node < nodes; ++node) {
-    debris += simulation_->model().IsDebris(node);
+    debris += simulation_->model().IsDebris(node) && !simulation_->model().IsAbsent(node);
   }
   counts_.debris = std::max(counts_.debris, static_cast<int>(debris));
 }

@@ -6,6 +6,7 @@
 #include <limits>
 #include <random>
 
+#include "services/base/core/sheets.h"
 #include "services/scene/builder/build.h"
 #include "tests/numerics/physics/accurate_under_test.h"
 #include "tests/numerics/physics/paper_solver.h"
@@ -29,7 +30,7 @@ constexpr double kEnergyMargin = 1.02, kWorkMargin = 1.05, kEnergyRounding_J = 1
 
 /// The small scene, if `several` with further solids, with the moduli of the standard case.
 scene::SceneData MakeScene(bool several = false) {
-  scene::SceneData data = several ? SeveralSolids(Vec3f::Zero(), true) : scene::BuildProcedural(scene::Small());
+  scene::SceneData data = several ? SeveralSolids(Vec3f::Zero(), true, true) : scene::BuildProcedural(scene::Small());
   PhysicsParams& physics = data.fixed.physics;
   physics.damping_per_s = 20;
   physics.membrane_Et_N_per_m = 300;
@@ -49,14 +50,16 @@ class Trial {
         solver_(make(scene)) {
     x_ = rest_;
     energy_.Gradient(rest_, &pull_);
-    const int rows = static_cast<int>(scene.membrane.rows), cols = static_cast<int>(scene.membrane.cols);
+    const SheetPart first = SheetsOf(scene)[0];
+    const int rows = static_cast<int>(first.rows), cols = static_cast<int>(first.cols);
     for (int r = rows / 2 - 3; r <= rows / 2 + 3; ++r) {
       for (int c = cols / 2 - 1; c <= cols / 2 + 1; ++c) {
-        patch_.push_back(scene.membrane.first + static_cast<Index>(r * cols + c));
+        patch_.push_back(scene.membrane.first + static_cast<Index>(r) * scene.membrane.cols + static_cast<Index>(c));
       }
     }
   }
 
+  [[nodiscard]] const SceneView& scene() const { return scene_; }
   [[nodiscard]] const Points& rest() const { return rest_; }
   [[nodiscard]] const Points& x() const { return x_; }
   [[nodiscard]] bool finite() const { return finite_; }
@@ -183,7 +186,8 @@ double Flatten(Trial* trial) {
 /// Moves blocks of nodes to one place: edges without a direction.
 double Collapse(Trial* trial) {
   Points x = trial->rest();
-  const Eigen::Index cols = 25, first = x.cols() - 73 * cols;
+  const MembraneGrid& grid = trial->scene().membrane;
+  const Eigen::Index cols = grid.cols, first = grid.first;
   for (Eigen::Index r = 10; r < 60; r += 10) {
     for (Eigen::Index c = 5; c < 20; c += 5) {
       for (Eigen::Index i = 0; i < 9; ++i) {

@@ -160,7 +160,7 @@ class Check {
       }
       const bool debris = !anchored && piece.size() <= kLargestDebris;
       for (const Index node : piece) {
-        if (model_.IsDebris(node) != debris) {
+        if (!model_.IsAbsent(node) && model_.IsDebris(node) != debris) {
           fault_ << "node " << node << " of a piece of " << piece.size() << (anchored ? " that hangs on" : " that is")
                  << (anchored ? " something" : " loose") << " is " << (debris ? "no " : "") << "debris; ";
         }

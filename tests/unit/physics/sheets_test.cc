@@ -1,0 +1,260 @@
+// Several sheets in one grid, a sheet without an organ, an organ without a sheet.
+#include "services/base/core/sheets.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "physics_node/simulation/tissue_simulation.h"
+#include "services/scene/builder/build.h"
+#include "tests/support/several_solids.h"
+
+namespace fulcrum::physics {
+namespace {
+
+/// A flat sheet of `rows` x `cols` nodes, h apart, from `corner` along +x and +y.
+scene::SheetBody Flat(const char* name, int rows, int cols, double h, const Vec3d& corner) {
+  scene::SheetBody sheet;
+  sheet.name = name;
+  sheet.grid.rows = rows;
+  sheet.grid.cols = cols;
+  sheet.grid.bending_row_stride = sheet.grid.bending_col_stride = 1;
+  for (int r = 0; r < rows; ++r) {
+    for (int c = 0; c < cols; ++c) sheet.nodes.push_back(corner + Vec3d(h * c, h * r, 0));
+  }
+  return sheet;
+}
+
+scene::SceneSettings SettingsOf(PhysicsMode mode) {
+  scene::SceneSettings settings = scene::Small();
+  settings.name = "sheets";
+  settings.has_organ = false;
+  settings.structures.clear();
+  settings.script.clear();
+  settings.planned_line.clear();
+  settings.physics.mode = mode;
+  settings.physics.gravity = Vec3f::Zero();
+  return settings;
+}
+
+constexpr double kCell = 0.0015;
+
+/// A sheet of 30 x 22 nodes about the origin and, if there are `others`, a narrower one beside it and a band of one
+/// cell above both.
+scene::SceneData Sheets(PhysicsMode mode, bool others) {
+  scene::Anatomy anatomy;
+  anatomy.sheets.push_back(Flat("first", 30, 22, kCell, Vec3d(-0.016, -0.022, 0)));
+  if (others) {
+    anatomy.sheets.push_back(Flat("second", 27, 14, kCell, Vec3d(0.05, -0.02, 0)));
+    anatomy.sheets.back().sides_held = false;
+    anatomy.sheets.push_back(Flat("band", 25, 2, kCell, Vec3d(0.02, -0.02, 0.06)));
+    anatomy.sheets.back().sides_held = false;
+  }
+  return scene::AssembleScene(SettingsOf(mode), anatomy);
+}
+
+Vec3f At(const TissueSimulation& simulation, Index particle) {
+  return simulation.particles().At(simulation.particles().Ref(particle));
+}
+
+/// A tool that points down, its tip at a place.
+ToolInput Pointing(const Vec3f& tip, float jaw_rad = 0) {
+  ToolInput input;
+  input.present = true;
+  input.pose.q_WT = Quatf(0, 1, 0, 0);
+  input.pose.p_WT = tip;
+  input.pose.jaw_rad = jaw_rad;
+  return input;
+}
+
+/// Farthest that a node of a sheet is from rest [m].
+float FarthestOf(const TissueSimulation& simulation, const SceneView& scene, const SheetPart& sheet) {
+  float farthest = 0;
+  for (std::uint32_t r = 0; r < sheet.rows; ++r) {
+    for (std::uint32_t c = 0; c < sheet.cols; ++c) {
+      const Index p = scene.membrane.first + (sheet.first_row + r) * scene.membrane.cols + c;
+      farthest = std::max(farthest, (At(simulation, p) - scene.rest_position[p]).norm());
+    }
+  }
+  return farthest;
+}
+
+class SeveralSheets : public testing::TestWithParam<PhysicsMode> {
+ protected:
+  scene::SceneData data_ = Sheets(GetParam(), true), alone_data_ = Sheets(GetParam(), false);
+  SceneView scene_ = data_.View(), alone_ = alone_data_.View();
+};
+
+TEST_P(SeveralSheets, MoveAsAlone) {
+  TissueSimulation simulation(scene_), alone(alone_);
+  std::array<ToolInput, kMaxTools> tools{};
+  for (int i = 0; i < 230; ++i) {
+    const float part = 0.0001f * static_cast<float>(std::min(i, 80));  // Then it stands still.
+    tools[0] = Pointing(Vec3f(0, part, 0.004f - part));
+    simulation.Step(tools);
+    alone.Step(tools);
+  }
+  ASSERT_GT(alone.MaxDisplacement(), 0.002f);
+  for (Index node = 0; node < alone_.membrane.node_count(); ++node) {
+    ASSERT_LT((At(simulation, node) - At(alone, node)).norm(), 1e-4f)
+        << node;  // Friction keeps a little of how it got there.
+  }
+  EXPECT_LT(FarthestOf(simulation, scene_, scene_.sheets[1]), 1e-6f);
+  EXPECT_LT(FarthestOf(simulation, scene_, scene_.sheets[2]), 1e-6f);
+  EXPECT_EQ(simulation.quarantined(), 0u);
+}
+
+TEST_P(SeveralSheets, ArePulledOneByOne) {
+  TissueSimulation simulation(scene_);
+  std::array<ToolInput, kMaxTools> tools{};
+  const Vec3f middle = scene_.rest_position[(scene_.sheets[1].first_row + 13) * scene_.membrane.cols + 7];
+  for (int i = 0; i < 120; ++i) {
+    const float lift = 0.00005f * static_cast<float>(std::max(i - 40, 0));
+    tools[0] = Pointing(middle + Vec3f(0, 0, lift), i < 20 ? 0.8f : 0.0f);
+    simulation.Step(tools);
+  }
+  EXPECT_TRUE(simulation.grasp(0).holding());
+  EXPECT_GT(FarthestOf(simulation, scene_, scene_.sheets[1]), 0.003f);
+  EXPECT_LT(FarthestOf(simulation, scene_, scene_.sheets[0]), 1e-6f);
+  EXPECT_LT(FarthestOf(simulation, scene_, scene_.sheets[2]), 1e-6f);
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes, SeveralSheets,
+                         testing::Values(PhysicsMode::kPaper, PhysicsMode::kXpbd, PhysicsMode::kAccurate));
+
+TEST(SheetsOfOneGrid, AreTheSameOnAnyNumberOfThreads) {
+  const scene::SceneData data = Sheets(PhysicsMode::kAccurate, true);
+  TissueSimulation one(data.View(), 1), three(data.View(), 3);
+  three.LetThreadsHelp(true);
+  std::array<ToolInput, kMaxTools> tools{};
+  for (int i = 0; i < 60; ++i) {
+    tools[0] = Pointing(Vec3f(0, 0, 0.003f - 0.0001f * static_cast<float>(i)));
+    tools[1] = Pointing(Vec3f(0.06f, 0, 0.003f - 0.0001f * static_cast<float>(i)));
+    one.Step(tools);
+    three.Step(tools);
+    ASSERT_EQ(one.StateHash(), three.StateHash()) << i;
+  }
+}
+
+TEST(SheetsOfOneGrid, ACutDividesOneOnly) {
+  const scene::SceneData data = Sheets(PhysicsMode::kAccurate, true);
+  const SceneView scene = data.View();
+  TissueSimulation simulation(scene);
+  const SheetPart& second = scene.sheets[1];
+  const Index nodes = scene.membrane.node_count();
+  TopologyState topology;
+  topology.rows = scene.membrane.rows;
+  topology.cols = scene.membrane.cols;
+  topology.dead_nodes.assign((nodes + 7) / 8, 0);
+  topology.dead_edges.assign((3 * nodes + 7) / 8, 0);
+  topology.shrink.assign(3 * nodes, 0);
+  // Two cuts across: what is between them is held by nothing.
+  for (const std::uint32_t row : {second.first_row + 9, second.first_row + 15}) {
+    for (std::uint32_t c = 0; c < second.cols; ++c) {
+      for (Index d = 1; d < 3; ++d) SetBit(topology.dead_edges, 3 * (row * scene.membrane.cols + c) + d);
+    }
+  }
+  topology.revision = 1;
+  simulation.ApplyTopology(topology);
+  Index debris = 0;
+  const std::vector<std::uint8_t> absent = AbsentNodes(scene);
+  for (Index node = 0; node < nodes; ++node) {
+    const bool is_absent = absent[node] != 0;
+    EXPECT_EQ(simulation.model().IsAbsent(node), is_absent);
+    debris += !is_absent && simulation.model().IsDebris(node) ? 1 : 0;
+  }
+  EXPECT_EQ(debris, 6u * 14);
+  for (int i = 0; i < 100; ++i) simulation.Step({});
+  EXPECT_LT(FarthestOf(simulation, scene, scene.sheets[0]), 1e-6f);
+  EXPECT_EQ(simulation.quarantined(), 0u);
+}
+
+/// The cells under the metal are those of the sheet that it touches.
+TEST(SheetsOfOneGrid, MetalTouchesTheOneBelow) {
+  const scene::SceneData data = Sheets(PhysicsMode::kAccurate, true);
+  const SceneView scene = data.View();
+  ASSERT_EQ(scene.tools[1].kind, ToolKind::kHook);
+  for (const std::size_t i : {0u, 1u, 2u}) {
+    TissueSimulation simulation(scene);
+    const SheetPart& sheet = scene.sheets[i];
+    const Index node = (sheet.first_row + sheet.rows / 2) * scene.membrane.cols + sheet.cols / 2;
+    std::array<ToolInput, kMaxTools> tools{};
+    CauteryContact contact;
+    for (int k = 0; k < 60; ++k) {
+      tools[1] = Pointing(scene.rest_position[node] + Vec3f(0, 0, 0.003f - 0.00006f * static_cast<float>(k)));
+      simulation.Step(tools);
+      contact = simulation.Cautery(1);
+    }
+    ASSERT_TRUE(contact.touching) << sheet.name;
+    EXPECT_TRUE(HasTriangle(scene, contact.triangle));
+    const std::uint32_t row = contact.triangle / 2 / (scene.membrane.cols - 1);
+    EXPECT_GE(row, sheet.first_row);
+    EXPECT_LT(row, sheet.first_row + sheet.rows);
+    EXPECT_LT((contact.material - scene.membrane_material[node]).norm(), 0.004f);
+    EXPECT_GT(contact.footprint.gap.size(), 10u);
+    EXPECT_TRUE(contact.tented) << "there is air on both sides";
+  }
+}
+
+/// A strip between two ends is a string: w^3 = 3 q L^4 / (64 E t) in the middle under the weight q per area, if it is
+/// as stiff along its free sides as in the middle.
+class Strip : public testing::TestWithParam<int> {};
+
+TEST_P(Strip, SagsAsAString) {
+  constexpr double kG = 3.2, kWeight_Pa = 0.5 * kG, kEt = 20, kLength_m = 40 * 0.002;
+  scene::Anatomy anatomy;
+  anatomy.sheets.push_back(Flat("wide", 20, 22, kCell, Vec3d(0.05, 0, 0)));
+  anatomy.sheets.push_back(Flat("strip", 41, GetParam(), 0.002, Vec3d::Zero()));
+  anatomy.sheets.back().sides_held = false;
+  anatomy.sheets.back().grid.density_kg_m2 = 0.5;
+  scene::SceneSettings settings = SettingsOf(PhysicsMode::kAccurate);
+  settings.physics.gravity = Vec3f(0, 0, -static_cast<float>(kG));
+  settings.physics.membrane_Et_N_per_m = kEt;
+  settings.physics.membrane_stiffening = settings.physics.membrane_prestrain = 0;
+  settings.physics.membrane_bending_Nm = 1e-9f;
+  settings.physics.damping_per_s = 4;
+  scene::SceneData data = scene::AssembleScene(settings, anatomy);
+  const SceneView scene = data.View();
+  TissueSimulation simulation(scene);
+  for (int i = 0; i < 1500; ++i) simulation.Step({});
+  const double expected = -std::cbrt(3 * kWeight_Pa * std::pow(kLength_m, 4) / (64 * kEt));
+  const SheetPart& strip = scene.sheets[1];
+  for (const std::uint32_t c : {0u, strip.cols / 2, strip.cols - 1}) {
+    const Index node = (strip.first_row + 20) * scene.membrane.cols + c;
+    EXPECT_NEAR(static_cast<double>(At(simulation, node).z()) / expected, 1, 0.05) << "column " << c;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Columns, Strip, testing::Values(2, 3, 6));
+
+TEST(WithoutASheet, SolidsArePressedAndGrasped) {
+  for (const PhysicsMode mode : {PhysicsMode::kPaper, PhysicsMode::kXpbd, PhysicsMode::kAccurate}) {
+    scene::Anatomy anatomy;
+    anatomy.solids.push_back(Box("pad", {-0.02, -0.02, 0}, {0.04, 0.04, 0.015}, {8, 8, 3}, 2e4));
+    Fix(&anatomy.solids[0], [](const Vec3d& p) { return p.z() < 1e-6; });
+    const scene::SceneData data = scene::AssembleScene(SettingsOf(mode), anatomy);
+    const SceneView scene = data.View();
+    ASSERT_EQ(scene.membrane.node_count(), 0u);
+    TissueSimulation simulation(scene);
+    std::array<ToolInput, kMaxTools> tools{};
+    float force = 0;
+    for (int i = 0; i < 100; ++i) {
+      tools[0] = Pointing(Vec3f(0, 0, 0.018f - 0.00005f * static_cast<float>(i)), i < 60 ? 0.8f : 0.0f);
+      tools[1] = Pointing(Vec3f(0.01f, 0, 0.018f - 0.00005f * static_cast<float>(i)));
+      simulation.Step(tools);
+      (void)simulation.Contacts(0);
+      (void)simulation.Contacts(1);
+      EXPECT_FALSE(simulation.Cautery(1).touching);
+      force = std::max(force, simulation.force(1).norm());
+    }
+    EXPECT_TRUE(simulation.grasp(0).holding());
+    EXPECT_GT(force, 0.01f);
+    EXPECT_GT(simulation.MaxDisplacement(), 0.0005f);
+    EXPECT_LT(simulation.MaxDisplacement(), 0.006f);
+    EXPECT_EQ(simulation.quarantined(), 0u);
+  }
+}
+
+}  // namespace
+}  // namespace fulcrum::physics
