@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "services/base/core/error.h"
+#include "services/base/core/sheets.h"
 
 namespace fulcrum::thermal {
 namespace {
@@ -71,6 +72,7 @@ std::vector<SurfaceMetric> NodeMetric(const SheetScene& scene) {
   std::vector<int> count(grid.node_count(), 0);
   for (Index r = 0; r + 1 < grid.rows; ++r) {
     for (Index c = 0; c + 1 < grid.cols; ++c) {
+      if (!HasCell(scene, r, c)) continue;
       const Index n00 = r * grid.cols + c, n01 = n00 + 1, n10 = n00 + grid.cols, n11 = n10 + 1;
       // Means of opposite sides, in material space and on the rest shape: J maps the former to the latter.
       const auto sides = [&]<class V>(const V* at) {
@@ -160,6 +162,7 @@ void MeasureMetric(const SheetScene& scene, Sheet* sheet) {
   };
   for (Index r = 0; r + 1 < grid.rows; ++r) {
     for (Index c = 0; c + 1 < grid.cols; ++c) {
+      if (!HasCell(scene, r, c)) continue;
       const Index n00 = r * grid.cols + c, n01 = n00 + 1, n10 = n00 + grid.cols, n11 = n10 + 1;
       triangle(n00, n01, n11);
       triangle(n00, n11, n10);
@@ -230,6 +233,7 @@ Sheet MakeSheet(const SheetScene& scene) {
   const std::span<const Vec2f> p = scene.membrane_material;
   for (Index r = 0; r + 1 < grid.rows; ++r) {
     for (Index c = 0; c + 1 < grid.cols; ++c) {
+      if (!HasCell(scene, r, c)) continue;
       const Index n00 = r * grid.cols + c, n01 = n00 + 1, n10 = n00 + grid.cols, n11 = n10 + 1;
       FillTriangle(&sheet, p[n00], p[n01], p[n11]);
       FillTriangle(&sheet, p[n00], p[n11], p[n10]);

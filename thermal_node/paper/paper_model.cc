@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "services/base/core/sheets.h"
 #include "thermal_node/heat/wide.h"
 
 namespace fulcrum::thermal {
@@ -59,11 +60,14 @@ PaperModel::PaperModel(const SheetScene& scene, const Sheet& sheet)
     return (cell.iy / kTile) * sheet.tiles_x + cell.ix / kTile;
   };
   const auto nodes = static_cast<Index>(node_.size());
-  for (Index n = 0; n < nodes; ++n) ++bin_offset_[tile_of(n) + 1];
+  const std::vector<std::uint8_t> absent = AbsentNodes(scene);
+  for (Index n = 0; n < nodes; ++n) bin_offset_[tile_of(n) + 1] += absent[n] == 0 ? 1 : 0;
   for (std::size_t i = 1; i < bin_offset_.size(); ++i) bin_offset_[i] += bin_offset_[i - 1];
-  bin_node_.resize(nodes);
+  bin_node_.resize(bin_offset_.back());
   std::vector<Index> next(bin_offset_.begin(), bin_offset_.end() - 1);
-  for (Index n = 0; n < nodes; ++n) bin_node_[next[tile_of(n)]++] = n;
+  for (Index n = 0; n < nodes; ++n) {
+    if (absent[n] == 0) bin_node_[next[tile_of(n)]++] = n;
+  }
   invalid_.reserve(1024);
   if (as_ == PaperForm::kPrinted) FindBorder(sheet);
 }

@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "tests/numerics/thermal/flat_scene.h"
+#include "tests/numerics/thermal/heat_cases.h"
+#include "tests/support/several_solids.h"
 #include "thermal_node/topology/mesh_topology.h"
 
 namespace fulcrum::thermal {
@@ -201,6 +203,56 @@ TEST_F(TopologyTest, RestoredTopologyGoesOn) {
   EXPECT_TRUE(other.Commit());
   EXPECT_EQ(other.revision(), topology_.revision() + 1);
   EXPECT_GT(other.dead_edge_count(), topology_.dead_edge_count());
+}
+
+/// Cells of a second sheet lie apart from those of the first: heat stays in it, and a hole cuts its edges only.
+TEST(SeveralSheets, HaveFieldsOfTheirOwn) {
+  const scene::SceneData data = SeveralSolids(Vec3f::Zero(), true, true);
+  const SceneView scene = data.View();
+  const SheetPart& veil = scene.sheets[1];
+  const Index cols = scene.membrane.cols, middle = (veil.first_row + veil.rows / 2) * cols + veil.cols / 2;
+  Vec2f low = Vec2f::Constant(1), high = -low;
+  for (std::uint32_t r = 0; r < veil.rows; ++r) {
+    for (std::uint32_t c = 0; c < veil.cols; ++c) {
+      const Vec2f& m = scene.membrane_material[(veil.first_row + r) * cols + c];
+      low = low.cwiseMin(m);
+      high = high.cwiseMax(m);
+    }
+  }
+  const auto of_veil = [&](double x, double y) {
+    const Vec2f p(static_cast<float>(x), static_cast<float>(y));
+    return (p.array() >= low.array()).all() && (p.array() <= high.array()).all();
+  };
+  HeatField field(MakeSheet(scene), MakeMaterial(scene.thermal));
+  std::size_t cells = 0;
+  Fill(&field, [&](double x, double y) {
+    cells += of_veil(x, y) ? 1 : 0;
+    return of_veil(x, y) ? 40.0 : 0.0;
+  });
+  const float area = (high - low).prod() / (scene.thermal.cell_m * scene.thermal.cell_m);
+  EXPECT_NEAR(static_cast<float>(cells), area, 0.03f * area);
+  Ledger ledger;
+  for (int n = 0; n < 50; ++n) field.Diffuse(0.01f, &ledger);
+  ForCells(field, [&](double theta, double x, double y) {
+    if (!of_veil(x, y)) {
+      ASSERT_EQ(theta, 0) << x << " " << y;
+    }
+  });
+  MeshTopology topology(scene, field.sheet());
+  const CellIndex at = field.sheet().CellOf(scene.membrane_material[middle]);
+  double heat = 0;
+  for (int y = at.iy - 10; y <= at.iy + 10; ++y) {
+    for (int x = at.ix - 10; x <= at.ix + 10; ++x) {
+      field.TakeOut(field.Wake(x / kTile, y / kTile), (y % kTile) * kTile + x % kTile, kRemoved, &heat);
+    }
+  }
+  topology.StageCut(field, {at.ix - 10, at.iy - 10}, {at.ix + 10, at.iy + 10});
+  EXPECT_TRUE(topology.Commit());
+  EXPECT_TRUE(TestBit(topology.committed().dead_nodes, middle));
+  for (Index edge = 0; edge < 3 * scene.membrane.node_count(); ++edge) {
+    const bool is_dead = TestBit(topology.committed().dead_edges, edge);
+    EXPECT_TRUE(!is_dead || edge / 3 / cols >= veil.first_row) << edge;
+  }
 }
 
 }  // namespace
