@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "render_node/geometry/sheet_rim.h"
+#include "services/base/core/sheets.h"
 
 namespace fulcrum::render {
 namespace {
@@ -20,21 +21,43 @@ constexpr float kFollow = 0.45f;
 }  // namespace
 
 FatLayer::FatLayer(const SceneView& scene, std::uint32_t stride) {
-  const MembraneGrid& grid = scene.membrane;
-  if (grid.rows < 2 || grid.cols < 2 || scene.tube_surface.empty()) {
+  if (scene.tube_surface.empty() || scene.membrane.node_count() == 0) {
     return;
   }
-  std::vector<std::uint32_t> rows, cols;
-  const auto pick = [stride](std::uint32_t count, std::vector<std::uint32_t>* out) {
-    for (std::uint32_t i = 0; i < count - 1; i += stride) {
-      out->push_back(i);
-    }
-    out->push_back(count - 1);
-  };
-  pick(grid.rows, &rows);
-  pick(grid.cols, &cols);
   const NearestOnSurface nearest(scene.rest_position, scene.tube_surface);
+  for (const SheetPart& sheet : SheetsOf(scene)) {
+    if (sheet.over != kNoIndex) AddSheet(scene, sheet, stride, nearest);
+  }
+  // Relative to the tenth percentile instead of the smallest gap, because single folds of the tube are close to the
+  // membrane.
+  std::vector<float> gaps;
+  for (const Anchor& anchor : anchors_) {
+    gaps.push_back(anchor.rest_gap);
+  }
+  std::nth_element(gaps.begin(), gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 10), gaps.end());
+  const std::vector<float> rim = SheetRim(scene);
+  for (const Anchor& anchor : anchors_) {
+    thickness_.push_back(std::clamp((anchor.rest_gap - gaps[gaps.size() / 10]) / kThickFat, 0.0f, 1.0f) +
+                         kThinsToRim * std::min(0.0f, rim[anchor.node]));
+  }
+  positions_.resize(anchors_.size());
+  normals_.resize(anchors_.size());
+}
+
+void FatLayer::AddSheet(const SceneView& scene, const SheetPart& sheet, std::uint32_t stride,
+                        const NearestOnSurface& nearest) {
+  const MembraneGrid& grid = scene.membrane;
+  std::vector<std::uint32_t> rows, cols;
+  const auto pick = [stride](std::uint32_t first, std::uint32_t count, std::vector<std::uint32_t>* out) {
+    for (std::uint32_t i = 0; i < count - 1; i += stride) {
+      out->push_back(first + i);
+    }
+    out->push_back(first + count - 1);
+  };
+  pick(sheet.first_row, sheet.rows, &rows);
+  pick(0, sheet.cols, &cols);
   const std::span<const float> rest(scene.rest_position.front().data(), 3 * scene.rest_position.size());
+  const auto base = static_cast<Index>(anchors_.size());
   for (const std::uint32_t row : rows) {
     for (const std::uint32_t col : cols) {
       const Index node = row * grid.cols + col;
@@ -51,28 +74,14 @@ FatLayer::FatLayer(const SceneView& scene, std::uint32_t stride) {
       materials_.push_back(m);
     }
   }
-  // Relative to the tenth percentile instead of the smallest gap, because single folds of the tube are close to the
-  // membrane.
-  std::vector<float> gaps;
-  for (const Anchor& anchor : anchors_) {
-    gaps.push_back(anchor.rest_gap);
-  }
-  std::nth_element(gaps.begin(), gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 10), gaps.end());
-  const std::vector<float> rim = SheetRim(scene);
-  for (const Anchor& anchor : anchors_) {
-    thickness_.push_back(std::clamp((anchor.rest_gap - gaps[gaps.size() / 10]) / kThickFat, 0.0f, 1.0f) +
-                         kThinsToRim * std::min(0.0f, rim[anchor.node]));
-  }
   const auto width = static_cast<Index>(cols.size());
   for (Index r = 0; r + 1 < rows.size(); ++r) {
     for (Index c = 0; c + 1 < width; ++c) {
-      const Index n00 = r * width + c;
+      const Index n00 = base + r * width + c;
       triangles_.push_back({n00, n00 + 1, n00 + width + 1});
       triangles_.push_back({n00, n00 + width + 1, n00 + width});
     }
   }
-  positions_.resize(anchors_.size());
-  normals_.resize(anchors_.size());
 }
 
 void FatLayer::Update(std::span<const float> xyz, const MembraneMesh& membrane) {

@@ -13,7 +13,7 @@ namespace fulcrum::render {
 
 class FatLayer {
  public:
-  /// Every `stride`-th node of the membrane's grid carries a fat vertex. Keeps a reference to the scene's arrays.
+  /// Every `stride`-th node of each sheet over an organ carries a fat vertex. Keeps a reference to the scene's arrays.
   FatLayer(const SceneView& scene, std::uint32_t stride);
 
   /// Computes positions and normals from the particles and the membrane as drawn, in which removed nodes have
@@ -33,6 +33,8 @@ class FatLayer {
                  std::vector<float>* bared) const;
 
  private:
+  void AddSheet(const SceneView& scene, const SheetPart& sheet, std::uint32_t stride, const NearestOnSurface& nearest);
+
   struct Anchor {
     Index node;         // Node of the membrane's grid.
     SurfacePoint foot;  // Nearest point on the tube.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "render_node/geometry/surface.h"
+#include "services/base/core/sheets.h"
 
 namespace fulcrum::render {
 namespace {
@@ -19,6 +20,7 @@ MembraneMesh::MembraneMesh(const SceneView& scene)
   const std::size_t nodes = scene.membrane.node_count();
   dead_nodes_.assign((nodes + 7) / 8, 0);
   dead_edges_.assign((3 * nodes + 7) / 8, 0);
+  absent_ = AbsentNodes(scene);
   BuildTriangles();
 }
 
@@ -39,8 +41,8 @@ void MembraneMesh::FindGone() {
   const Held held{*this};
   const SlitSheet sheet(held);
   gone_list_.clear();
-  gone_.assign(nodes, 0);
-  std::vector<std::uint8_t> seen(nodes, 0);
+  gone_ = absent_;
+  std::vector<std::uint8_t> seen = absent_;
   std::vector<Index> piece;
   for (Index start = 0; start < nodes; ++start) {
     if (TestBit(dead_nodes_, start)) {
@@ -111,8 +113,9 @@ void MembraneMesh::BuildTriangles() {
   }
 }
 
-// Returns true if both triangles of the cell are intact.
+// Returns true if both triangles of the cell exist and are intact.
 bool MembraneMesh::AddTriangles(std::uint32_t row, std::uint32_t col) {
+  if (!HasCell(scene_, row, col)) return false;
   const Held held{*this};
   const SlitSheet sheet(held);
   bool intact = true;

@@ -56,7 +56,7 @@ class MembraneMesh {
   /// True if no part of the block is cut or removed.
   [[nodiscard]] bool block_intact(std::size_t block) const { return block_intact_[block] != 0; }
 
-  /// True if the node is vaporised or part of a crumb.
+  /// True if the node is vaporised, part of a crumb or of no sheet.
   [[nodiscard]] bool node_gone(Index node) const { return gone_[node] != 0; }
 
  private:
@@ -86,7 +86,7 @@ class MembraneMesh {
   std::uint32_t cols_;
   std::vector<std::uint8_t> dead_nodes_;
   std::vector<std::uint8_t> dead_edges_;
-  std::vector<std::uint8_t> gone_;  // Per node.
+  std::vector<std::uint8_t> absent_, gone_;  // Per node.
   std::vector<Index> gone_list_;
   std::vector<Part> parts_;
   std::vector<Vec3f> positions_;

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "render_node/geometry/surface.h"
+#include "services/base/core/sheets.h"
 
 namespace fulcrum::render {
 namespace {
@@ -20,8 +21,8 @@ struct Sides {
 
 class Sheet {
  public:
-  explicit Sheet(const SceneView& scene)
-      : scene_(scene), last_row_(scene.membrane.rows - 1), last_col_(scene.membrane.cols - 1) {}
+  Sheet(const SceneView& scene, const SheetPart& part)
+      : scene_(scene), first_row_(part.first_row), last_row_(part.rows - 1), last_col_(part.cols - 1) {}
 
   /// The sides most of which are near these triangles.
   [[nodiscard]] Sides Near(std::span<const Vec3f> vertices, std::span<const Triangle> triangles) const {
@@ -40,15 +41,14 @@ class Sheet {
             is_near(last_row_, 0, 0, last_col_)};
   }
 
-  /// 1 on these sides, falling to 0.
-  [[nodiscard]] std::vector<float> From(const Sides& sides) const {
-    std::vector<float> rim(scene_.membrane.node_count(), 0.0f);
+  /// `sign` on these sides, falling to 0; by node of the whole grid.
+  void From(const Sides& sides, float sign, std::vector<float>* rim) const {
     // Steps of the grid in its middle.
     const std::uint32_t r = last_row_ / 2, c = last_col_ / 2;
     const float along = (Place(r + 1, c) - Place(r, c)).norm(), across = (Place(r, c + 1) - Place(r, c)).norm();
     const float width =
         std::min({kRim_m, along * static_cast<float>(last_row_) / 3, across * static_cast<float>(last_col_) / 3});
-    if (!(width > 0)) return rim;
+    if (!(width > 0)) return;
     for (std::uint32_t row = 0; row <= last_row_; ++row) {
       for (std::uint32_t col = 0; col <= last_col_; ++col) {
         float inside = width;
@@ -56,36 +56,38 @@ class Sheet {
         if (sides.after_rows) inside = std::min(inside, along * static_cast<float>(last_row_ - row));
         if (sides.before_cols) inside = std::min(inside, across * static_cast<float>(col));
         if (sides.after_cols) inside = std::min(inside, across * static_cast<float>(last_col_ - col));
-        rim[row * scene_.membrane.cols + col] = 1 - inside / width;
+        (*rim)[(first_row_ + row) * scene_.membrane.cols + col] = sign * (1 - inside / width);
       }
     }
-    return rim;
   }
 
  private:
   [[nodiscard]] const Vec3f& Place(std::uint32_t row, std::uint32_t col) const {
-    return scene_.rest_position[scene_.membrane.first + row * scene_.membrane.cols + col];
+    return scene_.rest_position[scene_.membrane.first + (first_row_ + row) * scene_.membrane.cols + col];
   }
 
   const SceneView& scene_;
-  std::uint32_t last_row_, last_col_;
+  std::uint32_t first_row_, last_row_, last_col_;
 };
 
 }  // namespace
 
 std::vector<float> SheetRim(const SceneView& scene) {
-  const MembraneGrid& grid = scene.membrane;
-  if (grid.rows < 2 || grid.cols < 2) return std::vector<float>(grid.node_count(), 0.0f);
+  std::vector<float> rim(scene.membrane.node_count(), 0.0f);
   std::vector<Triangle> around;
   for (const StaticSurface& surface : scene.static_surfaces) {
     if (surface.role != SurfaceRole::kRetroperitoneum) continue;
     const auto triangles = scene.static_triangles.subspan(surface.first_triangle, surface.triangle_count);
     around.insert(around.end(), triangles.begin(), triangles.end());
   }
-  const Sheet sheet(scene);
-  if (const Sides sides = sheet.Near(scene.static_vertices, around); sides.any()) return sheet.From(sides);
-  std::vector<float> rim = sheet.From(sheet.Near(scene.rest_position, scene.tube_surface));
-  for (float& value : rim) value = -value;
+  for (const SheetPart& part : SheetsOf(scene)) {
+    const Sheet sheet(scene, part);
+    if (const Sides sides = sheet.Near(scene.static_vertices, around); sides.any()) {
+      sheet.From(sides, 1, &rim);
+    } else {
+      sheet.From(sheet.Near(scene.rest_position, scene.tube_surface), -1, &rim);
+    }
+  }
   return rim;
 }
 

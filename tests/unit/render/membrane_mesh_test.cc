@@ -5,7 +5,9 @@
 #include <algorithm>
 
 #include "render_node/geometry/fat_layer.h"
+#include "services/base/core/sheets.h"
 #include "services/scene/builder/build.h"
+#include "tests/support/several_solids.h"
 #include "tests/unit/render/interleaved.h"
 
 namespace fulcrum::render {
@@ -188,6 +190,52 @@ TEST_F(MembraneMeshTest, FatLaidBareEndsWithinTrianglesNotWithThem) {
   fat.FindBared([](const Vec2f&) { return false; }, mesh_, &bared);
   EXPECT_EQ(bared[0], 1);
   EXPECT_EQ(std::count(bared.begin(), bared.end(), 1.0f), 1);
+}
+
+TEST(SeveralSheets, AreDrawnApart) {
+  const scene::SceneData alone = SeveralSolids(Vec3f::Zero(), true);
+  const SceneView alone_scene = alone.View();
+  const scene::SceneData data = SeveralSolids(Vec3f::Zero(), true, true);
+  const SceneView scene = data.View();
+  ASSERT_EQ(scene.sheets.size(), 2u);
+  MembraneMesh mesh(scene);
+  std::size_t triangles = 0;
+  for (const SheetPart& sheet : scene.sheets) triangles += 2u * (sheet.rows - 1) * (sheet.cols - 1);
+  EXPECT_EQ(mesh.whole_triangles(), triangles);
+  EXPECT_EQ(mesh.triangles().size(), triangles);
+  const auto sheet_of = [&](Index vertex) { return vertex / scene.membrane.cols >= scene.sheets[1].first_row ? 1 : 0; };
+  const std::vector<std::uint8_t> absent = AbsentNodes(scene);
+  for (const Triangle& t : mesh.triangles()) {
+    EXPECT_EQ(sheet_of(t[0]), sheet_of(t[1]));
+    EXPECT_EQ(sheet_of(t[0]), sheet_of(t[2]));
+    for (const Index vertex : t) EXPECT_EQ(absent[vertex], 0);
+  }
+  std::vector<float> xyz;
+  for (const Vec3f& p : scene.rest_position) xyz.insert(xyz.end(), p.data(), p.data() + 3);
+  mesh.Update(xyz);
+  // A slit along the second sheet's rim: the ghosts continue it, and do not reach for the other one.
+  TopologyState topology;
+  topology.rows = scene.membrane.rows;
+  topology.cols = scene.membrane.cols;
+  topology.dead_nodes.assign((scene.membrane.node_count() + 7) / 8, 0);
+  topology.dead_edges.assign((3 * scene.membrane.node_count() + 7) / 8, 0);
+  for (std::uint32_t c = 0; c < scene.sheets[1].cols; ++c) {
+    for (const std::size_t d : {1u, 2u}) {
+      SetBit(topology.dead_edges, 3 * std::size_t{scene.sheets[1].first_row * scene.membrane.cols + c} + d);
+    }
+  }
+  ASSERT_TRUE(mesh.SetTopology(topology));
+  mesh.Update(xyz);
+  EXPECT_GT(mesh.triangles().size(), mesh.whole_triangles());
+  for (const Triangle& t : mesh.triangles().subspan(mesh.whole_triangles())) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_LT((mesh.positions()[t[k]] - mesh.positions()[t[(k + 1) % 3]]).norm(), 0.02f);
+    }
+  }
+  // No fat below what covers no organ.
+  const FatLayer fat(scene, 2);
+  EXPECT_EQ(fat.triangles().size(), FatLayer(alone_scene, 2).triangles().size());
+  EXPECT_FALSE(fat.triangles().empty());
 }
 
 }  // namespace
