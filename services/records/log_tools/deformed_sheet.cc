@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "services/base/core/sheets.h"
+
 namespace fulcrum::log_tools {
 namespace {
 
@@ -51,6 +53,7 @@ DeformedSheet::DeformedSheet(const SceneView& scene)
     : scene_(scene),
       rows_(static_cast<int>(scene.membrane.rows)),
       cols_(static_cast<int>(scene.membrane.cols)),
+      absent_(AbsentNodes(scene)),
       dead_(scene.membrane.node_count()),
       severed_(3 * scene.membrane.node_count()),
       place_(scene.membrane.node_count(), Vec3f::Zero()),
@@ -58,6 +61,7 @@ DeformedSheet::DeformedSheet(const SceneView& scene)
   // Largest distance of a place in a coarse cell from all of its corners.
   for (int row = 0; row < rows_; row += kStride) {
     for (int col = 0; col < cols_; col += kStride) {
+      if (absent_[Node(row, col)] != 0) continue;
       const Vec2f a = scene.membrane_material[Node(row, col)];
       const Vec2f b =
           scene.membrane_material[Node(std::min(row + kStride, rows_ - 1), std::min(col + kStride, cols_ - 1))];
@@ -80,6 +84,7 @@ void DeformedSheet::SetTopology(std::span<const std::uint8_t> dead_nodes, std::s
   const SlitSheet sheet(held);
   cut_triangles_.clear();
   for (Index triangle = 0; triangle < cut_of_.size(); ++triangle) {
+    if (!HasTriangle(scene_, triangle)) continue;
     const TriangleParts parts = sheet.Parts(MembraneTriangleAt(scene_.membrane.cols, triangle));
     const bool whole = parts.count == 1 && parts.owned[0] == kAllCorners;
     cut_of_[triangle] = whole ? -1 : static_cast<std::int32_t>(cut_triangles_.size());
@@ -198,7 +203,7 @@ std::optional<DeformedSheet::Place> DeformedSheet::Nearest(const Vec3f& p_W, flo
   for (int r = 0; r < rows_; r += kStride) {
     for (int c = 0; c < cols_; c += kStride) {
       const float squared = (place_[Node(r, c)] - p_W).squaredNorm();
-      if (squared < coarse) {
+      if (squared < coarse && absent_[Node(r, c)] == 0) {
         coarse = squared;
         row = r;
         col = c;
@@ -216,6 +221,7 @@ std::optional<DeformedSheet::Place> DeformedSheet::Nearest(const Vec3f& p_W, flo
     bool better = false;
     for (int r = row0; r < row1; ++r) {
       for (int c = col0; c < col1; ++c) {
+        if (!HasCell(scene_, static_cast<Index>(r), static_cast<Index>(c))) continue;
         for (Index triangle = 2 * static_cast<Index>(r * (cols_ - 1) + c), end = triangle + 2; triangle < end;
              ++triangle) {
           const auto offer = [&](const std::array<Vec3f, 3>& x, const std::array<Vec2f, 3>& material) {

@@ -47,7 +47,7 @@ class DeformedSheet {
     const DeformedSheet& sheet;
     [[nodiscard]] std::uint32_t rows() const { return sheet.scene_.membrane.rows; }
     [[nodiscard]] std::uint32_t cols() const { return sheet.scene_.membrane.cols; }
-    [[nodiscard]] bool Gone(Index node) const { return sheet.dead_[node] != 0; }
+    [[nodiscard]] bool Gone(Index node) const { return sheet.dead_[node] != 0 || sheet.absent_[node] != 0; }
     [[nodiscard]] bool Severed(std::size_t edge) const { return sheet.severed_[edge] != 0; }
     [[nodiscard]] Vec3f Place(Index node) const { return sheet.place_[node]; }
     [[nodiscard]] Vec3f Rest(Index node) const {
@@ -64,7 +64,7 @@ class DeformedSheet {
   const SceneView& scene_;
   int rows_, cols_;
   float coarse_reach_m_ = 0;
-  std::vector<std::uint8_t> dead_, severed_;
+  std::vector<std::uint8_t> absent_, dead_, severed_;  ///< By node; by edge.
   std::vector<std::size_t> dead_nodes_;
   std::vector<Vec3f> place_;          ///< [rows * cols] frame W [m]; dead nodes: for the first search only.
   std::vector<Index> cut_triangles_;  ///< Triangles with two or three dead edges, ascending.

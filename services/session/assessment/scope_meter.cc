@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/base/core/sheets.h"
 #include "services/session/assessment/gap.h"
 
 namespace fulcrum::assessment {
@@ -18,6 +19,7 @@ constexpr float kMeets_m = 0.005f;
 
 ScopeMeter::ScopeMeter(const SceneView& scene)
     : scene_(scene),
+      absent_(AbsentNodes(scene)),
       scope_(FindTool(scene.tools, ToolKind::kScope)),
       acting_(FindTool(scene.tools, ToolKind::kHook)),
       line_(scene),
@@ -59,6 +61,7 @@ HookSample ScopeMeter::MiddleOf(double time_s, const Vec3f& eye, const Vec3f& fo
   Vec2f sum = Vec2f::Zero();
   const auto nodes = scene_.rest_position.subspan(scene_.membrane.first, scene_.membrane.node_count());
   for (std::size_t i = 0; i < nodes.size(); ++i) {
+    if (absent_[i] != 0) continue;
     const Vec3f way = nodes[i] - eye;
     const float off = (way - way.dot(forward) * forward).norm();
     if (off >= kMeets_m || way.dot(forward) <= 0) continue;

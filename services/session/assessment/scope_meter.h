@@ -38,6 +38,7 @@ class ScopeMeter {
   [[nodiscard]] HookSample MiddleOf(double time_s, const Vec3f& eye, const Vec3f& forward) const;
 
   SceneView scene_;
+  std::vector<std::uint8_t> absent_;           ///< By node of the grid.
   std::optional<std::size_t> scope_, acting_;  ///< Tools.
   LineMeter line_;
   Lens lens_;
