@@ -24,13 +24,12 @@ void CoarseSpace::AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, flo
   const CellPlace here = grid_.row_place[static_cast<std::size_t>(row)];
   const float next_row =
       row + 1 < sheet_rows_ ? here.fraction + grid_.row_step[static_cast<std::size_t>(row)] : here.fraction;
-  const float column_step =
-      grid_.columns > 1 ? static_cast<float>(grid_.columns - 1) / static_cast<float>(cols - 1) : 0.0f;
-  CoarseRow sums(here.fraction, next_row, column_step, &matrix_.next);
+  const CoarseGrid::Columns& columns = grid_.sheets[grid_.sheet_of[static_cast<std::size_t>(row)]];
+  CoarseRow sums(here.fraction, next_row, columns.step, &matrix_.next);
   int cell = 0;
   sums.Begin(grid_.NodesOf(here.cell, cell));
   for (std::uint32_t col = 0; col < cols; ++col) {
-    const CellPlace at = grid_.column_place[col];
+    const CellPlace at = columns.place[col];
     if (at.cell != cell) {
       sums.End();
       cell = at.cell;

@@ -104,9 +104,11 @@ void CoarseSpace::RestrictHats() {
   for (std::size_t r = 0; r < static_cast<std::size_t>(hats_.rows); ++r) {
     const float *x = scratch_.residual.data() + 3 * r * hats_.width, *y = x + hats_.width, *z = y + hats_.width;
     const float* weight_of_hat = contacts_.coarse_weight.data() + r * hats_.width;
-    const CellPlace row = grid_.row_place[static_cast<std::size_t>(hats_.centre[r])];
+    const auto centre = static_cast<std::size_t>(hats_.centre[r]);
+    const CellPlace row = grid_.row_place[centre];
+    const CoarseGrid::Columns& columns = grid_.sheets[grid_.sheet_of[centre]];
     for (std::size_t c = 0; c < static_cast<std::size_t>(grid_.columns); ++c) {
-      const float* share = grid_.column_share.data() + c * hats_.width;
+      const float* share = columns.share.data() + c * hats_.width;
       __m128 sum_x = _mm_setzero_ps(), sum_y = sum_x, sum_z = sum_x, none = sum_x;
       for (std::size_t i = 0; i < hats_.width; i += kSse) {
         const __m128 w = _mm_mul_ps(_mm_load_ps(share + i), _mm_loadu_ps(weight_of_hat + i));
@@ -132,14 +134,16 @@ void CoarseSpace::ProlongToHats(int first, int end) {
     if (blocks_.off[r] != 0) {
       continue;
     }
-    const CellPlace row = grid_.row_place[static_cast<std::size_t>(hats_.centre[r])];
+    const auto centre = static_cast<std::size_t>(hats_.centre[r]);
+    const CellPlace row = grid_.row_place[centre];
+    const CoarseGrid::Columns& columns = grid_.sheets[grid_.sheet_of[centre]];
     const float* low = scratch_.nodes4.data() + kVertexFloats * static_cast<std::size_t>(row.cell * grid_.columns);
     const float* high = row.cell + 1 < grid_.rows ? low + kVertexFloats * static_cast<std::size_t>(grid_.columns) : low;
     const std::size_t at = 3 * r * hats_.width, plane = r * hats_.width;
     for (std::size_t i = 0; i < hats_.width; i += kSse) {
       __m128 coarse[3] = {_mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps()}, b[6], v[3];
       for (std::size_t c = 0; c < static_cast<std::size_t>(grid_.columns); ++c) {
-        const __m128 share = _mm_load_ps(grid_.column_share.data() + c * hats_.width + i);
+        const __m128 share = _mm_load_ps(columns.share.data() + c * hats_.width + i);
         for (std::size_t axis = 0; axis < 3; ++axis) {
           const float node =
               (1 - row.fraction) * low[kVertexFloats * c + axis] + row.fraction * high[kVertexFloats * c + axis];

@@ -15,8 +15,6 @@ namespace {
 /// Coarse nodes over the membrane. With those of the lattice they are some 250 in built-in, so the factor has some 750
 /// rows. Assumed.
 constexpr int kCoarseRows = 9, kCoarseColumns = 4;
-/// Of several sheets the longest has as many rows, the others fewer in proportion, but not less than this.
-constexpr int kLeastCoarseRows = 3;
 /// Distance of the nodes of the lattice over a single organ [m]: the outer radius of built-in. With 30 mm the organ's
 /// ovalling, which is soft, converges slowly (deploy/docs/measurements/physics, Lattice over the organ).
 constexpr double kLattice_m = 0.018;
@@ -34,6 +32,31 @@ std::vector<Place> Spread(int fine, int count) {
     place.push_back({cell, static_cast<float>(at - cell)});
   }
   return place;
+}
+
+/// The part of a coarse cell between two neighbours, and the fine place of each coarse node.
+float StepOf(int fine, int count) {
+  return count > 1 ? static_cast<float>(count - 1) / static_cast<float>(fine - 1) : 0.0f;
+}
+std::vector<int> NodesAt(int first, int fine, int count) {
+  std::vector<int> at;
+  for (int i = 0; i < count; ++i) at.push_back(first + i * (fine - 1) / std::max(count - 1, 1));
+  return at;
+}
+
+/// Continues places linearly up to `count` of them.
+template <class Place>
+void Continue(std::size_t count, float step, std::vector<Place>* place) {
+  while (place->size() < count) {
+    Place next = place->back();
+    next.fraction += step;
+    place->push_back(next);
+  }
+}
+
+/// So many of `most` coarse nodes that there are not more than hats `spacing` apart, and two at least.
+int CoarseCount(int fine, int most, int spacing) {
+  return std::min({most, std::max((fine - 1) / spacing + 1, 2), fine});
 }
 
 /// The coarse nodes by groups, each along the longest side of the box around it: neighbours are close in it, so the
@@ -63,10 +86,7 @@ CoarseSpace::CoarseSpace(const TissueScene& scene, const ElasticModel& model, co
       layout_(particles.layout()),
       tube_floats_(particles.tube_floats()),
       sheet_rows_(static_cast<int>(scene.membrane.rows)) {
-  const int cols = static_cast<int>(layout_.cols);
-  grid_.columns = std::min(kCoarseColumns, cols);
-  grid_.column_place = Spread<CellPlace>(cols, grid_.columns);
-  PlaceCoarseRows(scene);
+  PlaceCoarseNodes(scene);
   BuildHats();
   // The blocks of hats at the rim of a sheet hold what edges there are.
   for (Index edge = 0; !scene.sheets.empty() && edge < scene.membrane_rest_length.size(); ++edge) {
@@ -83,34 +103,41 @@ CoarseSpace::CoarseSpace(const TissueScene& scene, const ElasticModel& model, co
   AddBindings(model, particles);
 }
 
-/// Each sheet has coarse rows of its own, so that a correction of one does not move another. Rows of no sheet continue
-/// those of the sheet before them: hats, which are linear between their centres, can end there.
-void CoarseSpace::PlaceCoarseRows(const TissueScene& scene) {
+/// Each sheet has coarse nodes of its own, so that a correction of one does not move another: of the longest
+/// kCoarseRows rows, of the others fewer in proportion, and not more than hats: what coarse nodes between two hats add
+/// would not be in the coarse matrix. Beyond a sheet they are continued linearly: so are hats, whose centres need not
+/// lie on it.
+void CoarseSpace::PlaceCoarseNodes(const TissueScene& scene) {
   const std::vector<SheetPart> sheets = SheetsOf(scene);
+  const int hat_columns = std::max(std::min(kHatSpacing, static_cast<int>(layout_.slots)), 1);
   std::uint32_t longest = 0;
   for (const SheetPart& sheet : sheets) longest = std::max(longest, sheet.rows);
   for (const SheetPart& sheet : sheets) {
-    const auto rows = static_cast<int>(sheet.rows);
-    const int share = static_cast<int>(std::lround(1.0 * kCoarseRows * sheet.rows / longest));
-    const int count = std::min(std::max(share, kLeastCoarseRows), rows);
-    std::vector<CellPlace> place = Spread<CellPlace>(rows, count);
-    const float step = count > 1 ? static_cast<float>(count - 1) / static_cast<float>(rows - 1) : 0.0f;
-    while (grid_.row_place.size() < sheet.first_row) {
-      CellPlace next = grid_.row_place.back();
-      next.fraction += grid_.row_step.back();
-      grid_.row_place.push_back(next);
-      grid_.row_step.push_back(grid_.row_step.back());
+    const int rows = static_cast<int>(sheet.rows), cols = static_cast<int>(sheet.cols);
+    const auto share = static_cast<int>(std::lround(1.0 * kCoarseRows * sheet.rows / longest));
+    const int count = CoarseCount(rows, std::max(share, 2), kHatSpacing);
+    if (!grid_.row_place.empty()) {
+      const float step = grid_.row_step.back();
+      Continue(sheet.first_row, step, &grid_.row_place);
+      grid_.row_step.resize(sheet.first_row, step);
     }
-    for (int row = 0; row < rows; ++row) {
-      place[static_cast<std::size_t>(row)].cell += grid_.rows;
-      grid_.row_place.push_back(place[static_cast<std::size_t>(row)]);
-      grid_.row_step.push_back(step);
+    for (CellPlace place : Spread<CellPlace>(rows, count)) {
+      place.cell += grid_.rows;
+      grid_.row_place.push_back(place);
     }
-    for (int i = 0; i < count; ++i) {
-      grid_.row_at.push_back(static_cast<int>(sheet.first_row) + i * (rows - 1) / std::max(count - 1, 1));
-    }
+    grid_.row_step.resize(grid_.row_place.size(), StepOf(rows, count));
+    const std::vector<int> at = NodesAt(static_cast<int>(sheet.first_row), rows, count);
+    grid_.row_at.insert(grid_.row_at.end(), at.begin(), at.end());
     grid_.rows += count;
+    const int columns = CoarseCount(cols, kCoarseColumns, hat_columns);
+    CoarseGrid::Columns of{Spread<CellPlace>(cols, columns), StepOf(cols, columns), NodesAt(0, cols, columns),
+                           FloatArray()};
+    Continue(layout_.cols, of.step, &of.place);
+    of.at.resize(kCoarseColumns, cols - 1);
+    grid_.sheets.push_back(std::move(of));
+    grid_.columns = std::max(grid_.columns, columns);
   }
+  grid_.sheet_of = SheetOfRows(scene);
 }
 
 void CoarseSpace::BuildHats() {
@@ -155,16 +182,22 @@ void CoarseSpace::BuildHats() {
   blocks_.off.reserve(static_cast<std::size_t>(hats_.rows));
   scratch_.residual = FloatArray(3 * count);
   scratch_.value = FloatArray(3 * count);
-  grid_.column_share = FloatArray(static_cast<std::size_t>(grid_.columns) * hats_.width);
-  for (std::size_t i = 0; i < hats_.width; ++i) {
-    const auto slot = static_cast<std::uint32_t>(kHatSpacing * (i / kLanes)),
-               lane = static_cast<std::uint32_t>(i % kLanes);
-    const std::uint32_t last = layout_.cols > 0 ? layout_.cols - 1 : 0;
-    const CellPlace column = grid_.column_place[std::min(lane * layout_.slots + slot, last)];
-    const auto cell = static_cast<std::size_t>(column.cell);
-    grid_.column_share[cell * hats_.width + i] = 1.0f - column.fraction;
-    if (column.cell + 1 < grid_.columns) {
-      grid_.column_share[(cell + 1) * hats_.width + i] = column.fraction;
+  ShareColumns();
+}
+
+void CoarseSpace::ShareColumns() {
+  const std::uint32_t last = layout_.cols > 0 ? layout_.cols - 1 : 0;
+  for (CoarseGrid::Columns& columns : grid_.sheets) {
+    columns.share = FloatArray(static_cast<std::size_t>(grid_.columns) * hats_.width);
+    for (std::size_t i = 0; i < hats_.width; ++i) {
+      const auto slot = static_cast<std::uint32_t>(kHatSpacing * (i / kLanes)),
+                 lane = static_cast<std::uint32_t>(i % kLanes);
+      const CellPlace column = columns.place[std::min(lane * layout_.slots + slot, last)];
+      const auto cell = static_cast<std::size_t>(column.cell);
+      columns.share[cell * hats_.width + i] = 1.0f - column.fraction;
+      if (column.cell + 1 < grid_.columns) {
+        columns.share[(cell + 1) * hats_.width + i] = column.fraction;
+      }
     }
   }
 }
@@ -276,7 +309,7 @@ void CoarseSpace::BuildLattice(const TissueScene& scene, const ElasticModel& mod
   for (int i = 0; i < grid_.rows; ++i) {
     for (int j = 0; j < grid_.columns; ++j) {
       const int row = grid_.row_at[static_cast<std::size_t>(i)],
-                column = j * (static_cast<int>(layout_.cols) - 1) / std::max(grid_.columns - 1, 1);
+                column = grid_.sheets[grid_.sheet_of[static_cast<std::size_t>(row)]].at[static_cast<std::size_t>(j)];
       place.push_back(model.rest_position[scene.membrane.first + static_cast<Index>(row) * layout_.cols +
                                           static_cast<Index>(column)]);
     }
@@ -366,7 +399,7 @@ void CoarseSpace::AddWeights(const ElasticModel& model, const ParticleStore& par
   if (model.fixed(particle)) return;
   const Index node = particle - particles.tube_count();
   const CellPlace& row = grid_.row_place[node / layout_.cols];
-  const CellPlace& column = grid_.column_place[node % layout_.cols];
+  const CellPlace& column = grid_.sheets[grid_.sheet_of[node / layout_.cols]].place[node % layout_.cols];
   for (int i = 0; i < 2; ++i) {
     for (int j = 0; j < 2; ++j) {
       const double w =

@@ -110,10 +110,18 @@ class CoarseSpace {
   /// Where the coarse nodes are: those of the membrane by rows, then those of the lattice. Built once.
   struct CoarseGrid {
     int columns = 0, rows = 0, nodes = 0;
-    std::vector<CellPlace> row_place, column_place;  ///< By row and by column of the membrane.
-    std::vector<float> row_step;                     ///< By row: the part of a coarse cell between it and the next row.
-    std::vector<int> row_at;                         ///< By coarse row: its row of the membrane.
-    FloatArray column_share;  ///< [columns][width], part of a coarse column in a float of a row of hats.
+    std::vector<CellPlace> row_place;  ///< By row of the membrane.
+    /// Of a sheet, whose columns may be fewer than those of the membrane; beyond them they are continued.
+    struct Columns {
+      std::vector<CellPlace> place;  ///< By column of the membrane.
+      float step;                    ///< The part of a coarse cell between two columns.
+      std::vector<int> at;           ///< By coarse column: its column of the membrane.
+      FloatArray share;              ///< [columns][width], part of a coarse column in a float of a row of hats.
+    };
+    std::vector<Columns> sheets;
+    std::vector<std::size_t> sheet_of;  ///< By row: the number of its sheet.
+    std::vector<float> row_step;        ///< By row: the part of a coarse cell between it and the next row.
+    std::vector<int> row_at;            ///< By coarse row: its row of the membrane.
     std::vector<LatticePlace> tube_weights;
     std::vector<int> body;  ///< By node, as Partition::BodyOf.
     std::vector<int> off;   ///< Nodes that are off.
@@ -142,7 +150,8 @@ class CoarseSpace {
   static std::size_t GroupOf(int body, std::size_t bodies) {
     return body > 0 ? static_cast<std::size_t>(body) - 1 : bodies - 1;
   }
-  void PlaceCoarseRows(const TissueScene& scene);
+  void PlaceCoarseNodes(const TissueScene& scene);
+  void ShareColumns();
   void BuildHats();
   struct Lattice;
   static Lattice LatticeOf(const Solid& solid, std::size_t solids, const ElasticModel& model);

@@ -97,8 +97,7 @@ TEST_P(SeveralSheets, MoveAsAlone) {
   }
   ASSERT_GT(alone.MaxDisplacement(), 0.002f);
   for (Index node = 0; node < alone_.membrane.node_count(); ++node) {
-    ASSERT_LT((At(simulation, node) - At(alone, node)).norm(), 1e-4f)
-        << node;  // Friction keeps a little of how it got there.
+    ASSERT_LT((At(simulation, node) - At(alone, node)).norm(), 1e-6f) << node;
   }
   EXPECT_LT(FarthestOf(simulation, scene_, scene_.sheets[1]), 1e-6f);
   EXPECT_LT(FarthestOf(simulation, scene_, scene_.sheets[2]), 1e-6f);
