@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "services/base/core/sheets.h"
+
 namespace fulcrum::physics {
 namespace {
 
@@ -58,6 +60,7 @@ ContactProbe::ContactProbe(const TissueScene& scene, const TissueModel* model, c
     : scene_(scene),
       model_(model),
       particles_(particles),
+      sheet_of_(SheetOfRows(scene)),
       curvature_(scene, model, particles),
       compliance_(scene.physics.dt_s),
       step_s_(scene.physics.dt_s) {
@@ -100,7 +103,8 @@ ContactProbe::Motion ContactProbe::RingMotion(Index node) const {
                              {diagonal_dr, diagonal_dc}}) {
     if (row + r >= 0 && row + r < rows && col + c >= 0 && col + c < cols) {
       const auto at = static_cast<Index>((row + r) * cols + col + c);
-      if (model_->NodeAlive(at) && !model_->IsAbsent(at)) {
+      const bool is_same = sheet_of_[static_cast<std::size_t>(row + r)] == sheet_of_[static_cast<std::size_t>(row)];
+      if (is_same && model_->NodeAlive(at) && !model_->IsAbsent(at)) {
         ring[count++] = scene_.membrane.first + at;
       }
     }

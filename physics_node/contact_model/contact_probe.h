@@ -95,6 +95,7 @@ class ContactProbe {
   const TissueModel* model_;
   const ParticleStore* particles_;
   std::optional<ElasticForce> elastic_;  ///< In modes without forces of the solver.
+  std::vector<std::size_t> sheet_of_;    ///< By row of the membrane.
   SurfaceCurvature curvature_;
   std::array<ToolMemory, kMaxTools> tools_;
   ComplianceProbe compliance_;

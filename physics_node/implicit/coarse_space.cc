@@ -302,7 +302,15 @@ void CoarseSpace::BuildLattice(const TissueScene& scene, const ElasticModel& mod
     weights.new_cell = v == 0 || weights.node != grid_.tube_weights.back().node;
     grid_.tube_weights.push_back(weights);
   }
+  const std::vector<Index> body_of_sheet = BodyOfSheets(scene);
+  std::size_t bodies = lattices.size();
+  for (const Index body : body_of_sheet) bodies = std::max(bodies, body + std::size_t{1});
   grid_.body.assign(static_cast<std::size_t>(grid_.nodes), 0);
+  for (int node = 0; node < grid_.rows * grid_.columns; ++node) {
+    const auto row = static_cast<std::size_t>(grid_.row_at[static_cast<std::size_t>(node / grid_.columns)]);
+    const Index body = body_of_sheet[grid_.sheet_of[row]];
+    grid_.body[static_cast<std::size_t>(node)] = static_cast<int>(body);
+  }
   for (const auto& [key, node] : numbers) grid_.body[node] = static_cast<int>(key.first);
   grid_.off.reserve(grid_.body.size());
   std::vector<Vec3d> place;
@@ -315,14 +323,14 @@ void CoarseSpace::BuildLattice(const TissueScene& scene, const ElasticModel& mod
     }
   }
   place.resize(static_cast<std::size_t>(grid_.nodes));
-  std::vector<std::size_t> group(place.size(), GroupOf(0, lattices.size()));
+  std::vector<std::size_t> group;
+  for (const int body : grid_.body) group.push_back(GroupOf(body, bodies));
   for (const auto& [key, node] : numbers) {
     const Lattice& lattice = lattices[key.first];
     place[node] = lattice.origin + lattice.spacing * Vec3d(key.second[0], key.second[1], key.second[2]);
-    group[node] = GroupOf(static_cast<int>(key.first), lattices.size());
   }
-  matrix_.factor = CoarseFactor(Order(place, group, lattices.size()));
-  matrix_.left_out.assign(lattices.size(), 0);
+  matrix_.factor = CoarseFactor(Order(place, group, bodies));
+  matrix_.left_out.assign(bodies, 0);
   scratch_.nodes4 = FloatArray(kVertexFloats * static_cast<std::size_t>(grid_.nodes));
   scratch_.tube_nodes4 = FloatArray(kVertexFloats * static_cast<std::size_t>(grid_.nodes));
 }

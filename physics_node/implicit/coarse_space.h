@@ -43,6 +43,13 @@ class CoarseSpace {
   /// Rows of hats whose middle is one of the sheet's rows [first, end): first and end of them.
   [[nodiscard]] std::pair<int, int> HatRows(int first, int end) const;
 
+  /// Coarse nodes of a sheet are in use: the matrix follows it.
+  [[nodiscard]] bool SheetIsWhole(const Regions& regions) const {
+    for (int row = 0; row < grid_.rows; ++row) {
+      if (regions.whole(grid_.body[static_cast<std::size_t>(row * grid_.columns)])) return true;
+    }
+    return grid_.rows == 0 && regions.whole(0);
+  }
   /// The edge from a node of the sheet in direction `d` is cut or whole again; in force after ScaleHats.
   void MarkEdit(std::uint32_t row, std::uint32_t col, std::size_t d);
   /// Blocks of hats are sampled at their middle. Where a cut goes through the samples they are scaled to the edges that

@@ -6,6 +6,7 @@
 #include "physics_node/implicit/elements.h"
 #include "physics_node/implicit/implicit_model.h"
 #include "physics_node/implicit/implicit_state.h"
+#include "services/base/core/sheets.h"
 #include "services/base/core/solids.h"
 
 namespace fulcrum::physics::implicit {
@@ -35,6 +36,13 @@ std::vector<std::pair<ParticleRef, ParticleRef>> JoinedParticles(const ElasticMo
     }
   }
   return joined;
+}
+
+std::vector<Index> BodyOfRows(const TissueScene& scene) {
+  const std::vector<Index> body = BodyOfSheets(scene);
+  std::vector<Index> of;
+  for (const std::size_t sheet : SheetOfRows(scene)) of.push_back(body[sheet]);
+  return of;
 }
 
 }  // namespace
@@ -146,7 +154,7 @@ Organ OrganModel::View() const {
 ImplicitModel::ImplicitModel(const TissueScene& scene, const ElasticModel& model, const ParticleStore& particles)
     : layout(particles),
       grid(particles.layout()),
-      partition(particles, JoinedParticles(model, particles), SolidOfVertices(scene)),
+      partition(particles, JoinedParticles(model, particles), SolidOfVertices(scene), BodyOfRows(scene)),
       sheet(scene, model, particles),
       organ(model, particles.tube_count()),
       load(layout.floats),

@@ -14,14 +14,16 @@ constexpr int kRegionsPerTask = 3;
 }  // namespace
 
 Partition::Partition(const ParticleStore& particles, std::span<const std::pair<ParticleRef, ParticleRef>> joined,
-                     std::span<const Index> solid)
+                     std::span<const Index> solid, std::span<const Index> row_body)
     : tube_floats_(particles.tube_floats()),
       stride_(particles.layout().stride),
       tube_count_(particles.tube_count()),
       rows_(particles.layout().rows),
       cols_(particles.layout().cols) {
   sheet_regions_ = (static_cast<int>(rows_) + kRows - 1) / kRows;
-  body_.assign(static_cast<std::size_t>(sheet_regions_), 0);
+  for (int region = 0; region < sheet_regions_; ++region) {
+    body_.push_back(static_cast<int>(row_body[static_cast<std::size_t>(region * kRows)]));
+  }
   for (std::uint32_t v = 0; v < tube_count_; ++v) {
     const int body = static_cast<int>(solid[v]);
     const bool new_solid = first_vertex_.empty() || body != body_.back();
@@ -33,6 +35,7 @@ Partition::Partition(const ParticleStore& particles, std::span<const std::pair<P
     region_of_vertex_.push_back(sheet_regions_ + static_cast<int>(first_vertex_.size()) - 1);
   }
   first_vertex_.push_back(static_cast<int>(tube_count_));
+  for (const int body : body_) body_count_ = std::max(body_count_, body + 1);
   neighbours_.resize(body_.size());
   const auto join = [&](int a, int b) {
     if (a != b) {
@@ -41,7 +44,8 @@ Partition::Partition(const ParticleStore& particles, std::span<const std::pair<P
     }
   };
   for (int region = 0; region + 1 < sheet_regions_; ++region) {
-    join(region, region + 1);
+    const auto at = static_cast<std::size_t>(region);
+    if (body_[at] == body_[at + 1]) join(region, region + 1);
   }
   for (const auto& [a, b] : joined) {
     join(Of(a), Of(b));

@@ -37,9 +37,9 @@ class Partition {
   static constexpr int kRows = 8, kVertices = 64;
 
   /// `joined`: pairs of particles that forces join beyond rows and vertices next to each other. `solid`: of each vertex
-  /// of the organ, ascending; a region has vertices of one only.
+  /// of the organ, ascending; a region has vertices of one only. `row_body`: of each row of the membrane.
   Partition(const ParticleStore& particles, std::span<const std::pair<ParticleRef, ParticleRef>> joined,
-            std::span<const Index> solid);
+            std::span<const Index> solid, std::span<const Index> row_body);
 
   [[nodiscard]] int count() const { return static_cast<int>(neighbours_.size()); }
   [[nodiscard]] int Of(ParticleRef at) const;
@@ -47,11 +47,12 @@ class Partition {
   [[nodiscard]] int At(bool sheet, int place) const {
     return sheet ? place / kRows : region_of_vertex_[static_cast<std::size_t>(place)];
   }
-  /// The body of a region: 0 the membrane with the organ, to which it is bound, 1 and so on the other solids.
+  /// The body of a region: 0 the membrane with the organ, to which it is bound, then the other solids with the sheets
+  /// over them, then sheets over none.
   [[nodiscard]] int BodyOf(int region) const { return body_[static_cast<std::size_t>(region)]; }
   /// Blocks of ParticleStore with vertices of two solids: two regions share them.
   [[nodiscard]] std::span<const Index> split_blocks() const { return split_blocks_; }
-  [[nodiscard]] int body_count() const { return body_.empty() ? 0 : body_.back() + 1; }
+  [[nodiscard]] int body_count() const { return body_count_; }
   /// Rows or vertices of a region.
   [[nodiscard]] Task Extent(int region) const;
   [[nodiscard]] std::span<const int> neighbours(int region) const {
@@ -75,8 +76,9 @@ class Partition {
   int sheet_regions_ = 0;
   std::vector<int> region_of_vertex_;
   std::vector<Index> split_blocks_;
-  std::vector<int> first_vertex_;             ///< By region of the organ, and the number of vertices.
-  std::vector<int> body_;                     ///< By region, ascending.
+  std::vector<int> first_vertex_;  ///< By region of the organ, and the number of vertices.
+  std::vector<int> body_;          ///< By region.
+  int body_count_ = 0;
   std::vector<std::vector<int>> neighbours_;  ///< By region.
 };
 

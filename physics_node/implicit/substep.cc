@@ -201,7 +201,7 @@ void LineariseVerticesAndLevels(const SolverContext& context, const Inertia& ine
     });
   };
   ForTasksAndSideTask(&context.workers, state->regions.computed(), body, [&] {
-    if (state->coarse_due && state->regions.whole(0)) {
+    if (state->coarse_due && state->coarse.SheetIsWhole(state->regions)) {
       state->coarse.AssembleNextPart(system.sheet, system.sheet_matrix, inertia.inertia);
       state->coarse_due = false;
     }

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "services/base/core/sheets.h"
+
 namespace fulcrum::physics {
 namespace {
 

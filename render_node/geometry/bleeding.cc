@@ -160,8 +160,11 @@ Index Bleeding::NearestNode(const Vec2f& material, Index start) const {
 Vec2f Bleeding::Downhill(Index node, std::span<const Vec3f> positions) const {
   const std::uint32_t rows = scene_.membrane.rows, cols = scene_.membrane.cols;
   const std::uint32_t row = node / cols, col = node % cols;
-  const Index up = (row > 0 ? row - 1 : 0) * cols + col, down = std::min(row + 1, rows - 1) * cols + col;
-  const Index left = row * cols + (col > 0 ? col - 1 : 0), right = row * cols + std::min(col + 1, cols - 1);
+  const auto is_edge = [&](Index at, Index direction) { return scene_.membrane_rest_length[3 * at + direction] > 0; };
+  const Index up = row > 0 && is_edge(node - cols, 1) ? node - cols : node;
+  const Index down = row + 1 < rows && is_edge(node, 1) ? node + cols : node;
+  const Index left = col > 0 && is_edge(node - 1, 0) ? node - 1 : node;
+  const Index right = col + 1 < cols && is_edge(node, 0) ? node + 1 : node;
   Eigen::Matrix2f step;
   step << (scene_.membrane_material[right] - scene_.membrane_material[left]).transpose(),
       (scene_.membrane_material[down] - scene_.membrane_material[up]).transpose();

@@ -25,20 +25,21 @@ FatLayer::FatLayer(const SceneView& scene, std::uint32_t stride) {
     return;
   }
   const NearestOnSurface nearest(scene.rest_position, scene.tube_surface);
-  for (const SheetPart& sheet : SheetsOf(scene)) {
-    if (sheet.over != kNoIndex) AddSheet(scene, sheet, stride, nearest);
-  }
-  // Relative to the tenth percentile instead of the smallest gap, because single folds of the tube are close to the
-  // membrane.
-  std::vector<float> gaps;
-  for (const Anchor& anchor : anchors_) {
-    gaps.push_back(anchor.rest_gap);
-  }
-  std::nth_element(gaps.begin(), gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 10), gaps.end());
   const std::vector<float> rim = SheetRim(scene);
-  for (const Anchor& anchor : anchors_) {
-    thickness_.push_back(std::clamp((anchor.rest_gap - gaps[gaps.size() / 10]) / kThickFat, 0.0f, 1.0f) +
-                         kThinsToRim * std::min(0.0f, rim[anchor.node]));
+  for (const SheetPart& sheet : SheetsOf(scene)) {
+    if (sheet.over == kNoIndex) continue;
+    const auto first = static_cast<std::ptrdiff_t>(anchors_.size());
+    AddSheet(scene, sheet, stride, nearest);
+    // Relative to the tenth percentile instead of the smallest gap, because single folds of the tube are close to the
+    // membrane.
+    std::vector<float> gaps;
+    for (auto anchor = anchors_.begin() + first; anchor != anchors_.end(); ++anchor) gaps.push_back(anchor->rest_gap);
+    const auto tenth = gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 10);
+    std::nth_element(gaps.begin(), tenth, gaps.end());
+    for (auto anchor = anchors_.begin() + first; anchor != anchors_.end(); ++anchor) {
+      thickness_.push_back(std::clamp((anchor->rest_gap - *tenth) / kThickFat, 0.0f, 1.0f) +
+                           kThinsToRim * std::min(0.0f, rim[anchor->node]));
+    }
   }
   positions_.resize(anchors_.size());
   normals_.resize(anchors_.size());

@@ -21,6 +21,10 @@ MembraneMesh::MembraneMesh(const SceneView& scene)
   dead_nodes_.assign((nodes + 7) / 8, 0);
   dead_edges_.assign((3 * nodes + 7) / 8, 0);
   absent_ = AbsentNodes(scene);
+  anchored_.assign(nodes, 0);
+  for (const Binding& binding : scene.bindings) {
+    if (!scene.sheets.empty()) anchored_[binding.membrane - scene.membrane.first] = 1;
+  }
   BuildTriangles();
 }
 
@@ -35,7 +39,8 @@ bool MembraneMesh::SetTopology(const TopologyState& topology) {
   return true;
 }
 
-// Flood fill over live edges; a piece is a crumb if it is small and none of its nodes is fixed.
+// Flood fill over live edges; a piece is a crumb if it is small and none of its nodes is fixed or, in a scene of
+// several sheets, bound: there bindings may be all that holds a sheet.
 void MembraneMesh::FindGone() {
   const Index nodes = scene_.membrane.node_count();
   const Held held{*this};
@@ -58,7 +63,7 @@ void MembraneMesh::FindGone() {
     bool fixed = false;
     for (std::size_t k = 0; k < piece.size(); ++k) {
       const Index node = piece[k];
-      fixed = fixed || scene_.inverse_mass[scene_.membrane.first + node] == 0;
+      fixed = fixed || anchored_[node] != 0 || scene_.inverse_mass[scene_.membrane.first + node] == 0;
       sheet.ForEachNeighbour(node, [&](Index other, std::size_t edge) {
         if (!seen[other] && !TestBit(dead_edges_, edge) && !TestBit(dead_nodes_, other)) {
           seen[other] = 1;

@@ -86,7 +86,7 @@ class MembraneMesh {
   std::uint32_t cols_;
   std::vector<std::uint8_t> dead_nodes_;
   std::vector<std::uint8_t> dead_edges_;
-  std::vector<std::uint8_t> absent_, gone_;  // Per node.
+  std::vector<std::uint8_t> absent_, anchored_, gone_;  // Per node.
   std::vector<Index> gone_list_;
   std::vector<Part> parts_;
   std::vector<Vec3f> positions_;

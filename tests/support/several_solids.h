@@ -55,7 +55,8 @@ void Fix(scene::SolidBody* body, const Held& held) {
   for (std::size_t i = 0; i < body->vertices.size(); ++i) body->fixed[i] = body->fixed[i] || held(body->vertices[i]);
 }
 
-/// A sheet of 25 x 13 nodes over pad, lump and both strands, with free sides and bound to nothing.
+/// A sheet of 25 x 13 nodes over pad, lump and both strands, with free sides, bound to the lump four millimetres below
+/// it.
 inline scene::SheetBody Veil(const Vec3d& corner) {
   scene::SheetBody veil;
   veil.name = "veil";

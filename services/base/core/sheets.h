@@ -6,12 +6,13 @@
 #include <vector>
 
 #include "services/base/core/scene_view.h"
+#include "services/base/core/solids.h"
 
 namespace fulcrum {
 
 inline constexpr std::size_t kMaxSheets = 16;
-/// Rows of the grid between two sheets. What looks at the neighbours of a node looks less far; and sheets begin at
-/// multiples of it, so that no block of rows lies in two of them.
+/// Rows of the grid between two sheets. Sheets begin at multiples of it, so that no block of rows lies in two of them.
+/// What looks farther than this from a node asks SheetOfRows.
 inline constexpr std::uint32_t kRowsBetweenSheets = 8;
 
 /// The sheets of a scene; of a scene that lists none the whole grid, if it has one.
@@ -43,6 +44,15 @@ inline constexpr std::uint32_t kRowsBetweenSheets = 8;
     if (of[row] + 1 < sheets.size() && row >= sheets[of[row] + 1].first_row) ++of[row];
   }
   return of;
+}
+
+/// By sheet: the body that it moves with, by the number of a solid, else with a number of its own after those. Bodies
+/// are at rest or in motion as a whole.
+[[nodiscard]] inline std::vector<Index> BodyOfSheets(const TissueScene& scene) {
+  std::vector<Index> bodies;
+  Index next = SolidCount(scene);
+  for (const SheetPart& sheet : SheetsOf(scene)) bodies.push_back(sheet.over < SolidCount(scene) ? sheet.over : next++);
+  return bodies;
 }
 
 /// By node: 1 where it belongs to no sheet.

@@ -198,12 +198,23 @@ void DeformedSheet::FillDeadNodes() {
 }
 
 std::optional<DeformedSheet::Place> DeformedSheet::Nearest(const Vec3f& p_W, float within_m) const {
+  std::optional<Place> nearest;
+  for (const SheetPart& sheet : SheetsOf(scene_)) {
+    const std::optional<Place> place = NearestOn(sheet, p_W, within_m);
+    if (place && (!nearest || place->distance_m < nearest->distance_m)) nearest = place;
+  }
+  return nearest;
+}
+
+std::optional<DeformedSheet::Place> DeformedSheet::NearestOn(const SheetPart& sheet, const Vec3f& p_W,
+                                                             float within_m) const {
+  const int first_row = static_cast<int>(sheet.first_row), end_row = first_row + static_cast<int>(sheet.rows);
   float coarse = std::numeric_limits<float>::infinity();
-  int row = 0, col = 0;
-  for (int r = 0; r < rows_; r += kStride) {
-    for (int c = 0; c < cols_; c += kStride) {
+  int row = first_row, col = 0;
+  for (int r = first_row; r < end_row; r += kStride) {
+    for (int c = 0; c < static_cast<int>(sheet.cols); c += kStride) {
       const float squared = (place_[Node(r, c)] - p_W).squaredNorm();
-      if (squared < coarse && absent_[Node(r, c)] == 0) {
+      if (squared < coarse) {
         coarse = squared;
         row = r;
         col = c;

@@ -59,6 +59,7 @@ class DeformedSheet {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(cols_) + static_cast<std::size_t>(col);
   }
   void FillDeadNodes();
+  [[nodiscard]] std::optional<Place> NearestOn(const SheetPart& sheet, const Vec3f& p_W, float within_m) const;
   void CutIntoPieces(const Removed& removed);
 
   const SceneView& scene_;

@@ -89,6 +89,9 @@ class Reader {
   Reader(const SceneView& scene, const ContactReach& reach) : sheet_(scene) {
     const std::optional<std::size_t> hook = FindTool(scene.tools, ToolKind::kHook);
     if (!hook) throw InputError(std::string("scene \"") + scene.name + "\" has no hook: nothing in it can cut");
+    if (scene.membrane.node_count() == 0) {
+      throw InputError(std::string("scene \"") + scene.name + "\" has no sheet: nothing in it can be cut");
+    }
     tool_ = *hook;
     const ToolDescription& tool = scene.tools[tool_];
     axis_ = MetalAxis(tool);

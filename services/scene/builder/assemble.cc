@@ -228,7 +228,7 @@ const PlacedSheet& SheetNamed(const SceneSettings& settings, const std::vector<P
     if (name.empty() || name == sheet.name()) return sheet;
     names += (names.empty() ? "" : ", ") + sheet.name();
   }
-  if (sheets.empty()) Refuse(settings, user + ": a place on a sheet, but the scene has none; give world_mm");
+  if (sheets.empty()) Refuse(settings, user + ": a place on a sheet, but the scene has none");
   Refuse(settings, user + ": no sheet '" + name + "'; the scene has " + names);
 }
 

@@ -294,7 +294,8 @@ Anatomy ProceduralAnatomy(const SceneSettings& settings) {
 
 SceneData BuildProcedural(const SceneSettings& settings) {
   if (settings.import || !settings.bodies.empty() || !settings.sheets.empty() || !settings.has_organ) {
-    throw InputError("scene '" + settings.name + "': an imported organ and further bodies are not procedural");
+    throw InputError("scene '" + settings.name +
+                     "': only a procedural organ without further bodies or sheets is procedural");
   }
   return AssembleScene(settings, ProceduralAnatomy(settings));
 }

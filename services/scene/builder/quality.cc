@@ -167,10 +167,26 @@ std::string Describe(const SceneView& s, const SceneQuality& q) {
     text += line;
     text += '\n';
   };
-  add(s.solids.empty() ? "  vertices   %zu: organ %zu, membrane %u x %u"
-                       : "  vertices   %zu: solids %zu, membrane %u x %u",
+  add(!s.sheets.empty() || q.membrane_springs == 0 ? "  vertices   %zu: solids %zu, grid of the sheets %u x %u"
+      : s.solids.empty()                           ? "  vertices   %zu: organ %zu, membrane %u x %u"
+                                                   : "  vertices   %zu: solids %zu, membrane %u x %u",
       q.vertices, q.organ_vertices, s.membrane.rows, s.membrane.cols);
-  for (const SheetPart& sheet : s.sheets) add("  sheet      %s: %u x %u", sheet.name, sheet.rows, sheet.cols);
+  std::vector<bool> is_bound(s.sheets.size(), false);
+  const std::vector<std::size_t> sheet_of = SheetOfRows(s);
+  for (const Binding& b : s.bindings) {
+    if (!s.sheets.empty()) is_bound[sheet_of[(b.membrane - s.membrane.first) / s.membrane.cols]] = true;
+  }
+  for (std::size_t i = 0; i < s.sheets.size(); ++i) {
+    const SheetPart& sheet = s.sheets[i];
+    bool is_held = is_bound[i];
+    for (Index row = sheet.first_row; row < sheet.first_row + sheet.rows; ++row) {
+      for (Index col = 0; col < sheet.cols; ++col) {
+        is_held = is_held || s.inverse_mass[s.membrane.first + row * s.membrane.cols + col] == 0;
+      }
+    }
+    add("  sheet      %s: %u x %u%s", sheet.name, sheet.rows, sheet.cols,
+        is_held ? "" : "; neither held nor bound, so nothing keeps it in its place");
+  }
   for (const Solid& solid : s.solids) {
     add("  body       %s: %u vertices, %.3g kPa", solid.name, solid.vertex_count,
         1e-3 * static_cast<double>(solid.youngs_modulus_Pa));
@@ -199,8 +215,10 @@ std::string Describe(const SceneView& s, const SceneQuality& q) {
       1e3 * q.mean_edge_m);
   if (q.bindings > 0) add("  bindings   %.2f to %.2f mm long", 1e3 * q.least_binding_m, 1e3 * q.largest_binding_m);
   if (q.membrane_springs > 0) {
-    add("  flattened  %.1f x %.1f mm, lengths kept to %.2f %% rms, %.1f to %.1f %%", 1e3 * q.sheet_m[0],
-        1e3 * q.sheet_m[1], 100 * q.rms_flat_error, 100 * (q.least_flat_ratio - 1), 100 * (q.largest_flat_ratio - 1));
+    add(s.sheets.size() > 1 ? "  flattened  all of them %.1f x %.1f mm, lengths kept to %.2f %% rms, %.1f to %.1f %%"
+                            : "  flattened  %.1f x %.1f mm, lengths kept to %.2f %% rms, %.1f to %.1f %%",
+        1e3 * q.sheet_m[0], 1e3 * q.sheet_m[1], 100 * q.rms_flat_error, 100 * (q.least_flat_ratio - 1),
+        100 * (q.largest_flat_ratio - 1));
     add("  atlas      true length over length in the atlas %.3f to %.3f a cell, area %.3f to %.3f",
         q.least_atlas_stretch, q.largest_atlas_stretch, q.least_atlas_area, q.largest_atlas_area);
   }

@@ -151,7 +151,7 @@ struct StructureSettings {
 struct ScriptKeySettings {
   double time_s = 0;
   int tool = 0;
-  std::optional<Vec3f> world_m;     ///< Set: position in W. Not set: the four fields below apply.
+  std::optional<Vec3f> world_m;     ///< Set: position in W. Not set: a place on the sheet `on`, by the next three.
   Vec2f sheet = Vec2f(0.5f, 0.5f);  ///< (s, t) fractions of the sheet in [0, 1].
   double height_m = 0;              ///< Height above the sheet at rest; negative: pressed in.
   Vec3f offset_m = Vec3f::Zero();   ///< Offset in W, added to the point on the sheet.

@@ -15,7 +15,8 @@ namespace fulcrum::scene {
 namespace {
 
 constexpr double kAtlasMargin_m = 0.001;  ///< Smallest sheet coordinate, so that a patch has texels on all sides.
-/// Texels between the places of two sheets in the atlas begin at multiples of a patch, so that no patch shows two.
+constexpr double kApart_m = 0.004;        ///< Between two sheets in the atlas: more than the heat of a burn spreads.
+/// The place of each sheet in the atlas begins at a multiple of a patch, so that no patch shows two.
 constexpr double kTexel_m = static_cast<double>(MembraneGrid().texel_m);
 constexpr double kPatch_m = kPatchTexels * kTexel_m;
 
@@ -68,7 +69,9 @@ bool IsHeld(const SheetBody& sheet, int row, int col) {
 class Shelves {
  public:
   Eigen::Vector2d Put(const Eigen::Vector2d& size, double width) {
-    const auto patches = [](double length) { return std::ceil((length + 2 * kAtlasMargin_m) / kPatch_m) * kPatch_m; };
+    const auto patches = [](double length) {
+      return std::ceil((length + 2 * kAtlasMargin_m + kApart_m) / kPatch_m) * kPatch_m;
+    };
     if (x_ > 0 && x_ + size.x() > width) {
       x_ = 0;
       y_ += height_;
@@ -206,16 +209,21 @@ void AddBindings(const SceneSettings& settings, const Anatomy& anatomy, const st
       if (is_of) surface.push_back(t);
     }
     const std::size_t before = scene->bindings.size();
+    std::size_t candidates = 0;
     const TriangleLocator locator(vertices, surface);
-    for (int r = m.binding_row_stride / 2; r < m.rows && !surface.empty(); r += m.binding_row_stride) {
-      for (int c = m.binding_col_stride / 2 + 1; c < m.cols; c += m.binding_col_stride) {
+    // Scenes of one membrane keep theirs.
+    const bool is_membrane = settings.has_organ && k == 0;
+    const int first_row = is_membrane ? m.binding_row_stride / 2 : (m.binding_row_stride - 1) / 2;
+    const int first_col = is_membrane ? m.binding_col_stride / 2 + 1 : (m.binding_col_stride - 1) / 2;
+    for (int r = first_row; r < m.rows && !surface.empty(); r += m.binding_row_stride) {
+      for (int c = first_col; c < m.cols; c += m.binding_col_stride) {
         const Index particle = scene->fixed.membrane.first +
                                (parts[k].first_row + static_cast<Index>(r)) * scene->fixed.membrane.cols +
                                static_cast<Index>(c);
+        if (scene->inverse_mass[particle] == 0) continue;
+        ++candidates;
         const auto hit = locator.Closest(sheet.nodes[NodeOf(sheet, r, c)], m.binding_reach_m);
-        if (hit.triangle == kNoIndex || scene->inverse_mass[particle] == 0) {
-          continue;
-        }
+        if (hit.triangle == kNoIndex) continue;
         Binding binding{particle, surface[hit.triangle], {}, static_cast<float>(hit.closest.distance)};
         for (int i = 0; i < 3; ++i) {
           binding.barycentric[i] = static_cast<float>(hit.closest.barycentric[i]);
@@ -224,6 +232,10 @@ void AddBindings(const SceneSettings& settings, const Anatomy& anatomy, const st
       }
     }
     if (scene->bindings.size() == before && sheet.over != kNoIndex) {
+      if (candidates == 0) {
+        Refuse(settings, sheet.name + ": every node on the sub-grid of the bindings is fixed; lower its " +
+                             "binding_row_stride or binding_col_stride, or give it more rows and columns");
+      }
       std::ostringstream text;
       text << "no " << sheet.name << " node lies within binding_reach = " << 1e3 * m.binding_reach_m << " mm of the "
            << anatomy.solids[sheet.over].name;

@@ -64,15 +64,16 @@ SolidBody Build(const BodySettings& settings, const ImportSettings& like, const 
   return body;
 }
 
-/// Build, with the body's name in front of a refusal.
-SolidBody BuildNamed(const BodySettings& settings, const ImportSettings& like, const Progress& progress) {
+/// build(), with the name in front of a refusal.
+template <class Build>
+auto Named(const char* what, const std::string& name, const Build& build) {
   try {
-    return Build(settings, like, progress);
+    return build();
   } catch (const SpotError&) {
     throw;  // It names the body, and the place to draw.
   } catch (const InputError& error) {
     const std::string text = error.what();
-    throw InputError(text.starts_with(settings.name) ? text : "body '" + settings.name + "': " + text);
+    throw InputError(text.starts_with(name) ? text : std::string(what) + " '" + name + "': " + text);
   }
 }
 
@@ -80,8 +81,7 @@ SolidBody BuildNamed(const BodySettings& settings, const ImportSettings& like, c
 void DrapeOver(const SheetSettings& settings, const Placement& placement, const Vec3d& origin, const Anatomy& anatomy,
                SheetBody* sheet) {
   const auto at = std::ranges::find(anatomy.solids, settings.over, &SolidBody::name);
-  if (at == anatomy.solids.end())
-    throw InputError("sheet '" + settings.name + "': over: no body '" + settings.over + "'");
+  if (at == anatomy.solids.end()) throw InputError("over: no body '" + settings.over + "'");
   sheet->over = static_cast<Index>(at - anatomy.solids.begin());
   TriangleMesh surface{at->vertices, BoundaryOf(at->tets)};
   ImportSettings patch;
@@ -122,11 +122,13 @@ void AddSheets(const SceneSettings& settings, const Placement& placement, const 
     sheet.grid = wanted.grid;
     sheet.ends_held = wanted.ends_held;
     sheet.sides_held = wanted.sides_held;
-    if (wanted.over.empty()) {
-      Span(wanted, placement, origin, &sheet);
-    } else {
-      DrapeOver(wanted, placement, origin, *anatomy, &sheet);
-    }
+    Named("sheet", wanted.name, [&] {
+      if (wanted.over.empty()) {
+        Span(wanted, placement, origin, &sheet);
+      } else {
+        DrapeOver(wanted, placement, origin, *anatomy, &sheet);
+      }
+    });
     Say(progress, "%s: %d x %d nodes", sheet.name.c_str(), sheet.grid.rows, sheet.grid.cols);
     anatomy->sheets.push_back(std::move(sheet));
   }
@@ -135,7 +137,7 @@ void AddSheets(const SceneSettings& settings, const Placement& placement, const 
 void AddBodies(const SceneSettings& settings, const Placement& placement, const Progress& progress, Anatomy* anatomy) {
   const ImportSettings like = settings.import.value_or(ImportSettings{});
   for (const BodySettings& wanted : settings.bodies) {
-    SolidBody body = BuildNamed(wanted, like, progress);
+    SolidBody body = Named("body", wanted.name, [&] { return Build(wanted, like, progress); });
     for (auto* points : {&body.vertices, &body.surface_vertices}) {
       for (Vec3d& p : *points) p = placement.ToWorld(p);
     }

@@ -247,14 +247,21 @@ void ReadTool(StrictMap map, const Folders& folders, const RenderParams& render,
   }
 }
 
-ScriptKeySettings ReadKey(StrictMap map, double duration_s) {
+/// `sheets`: names of those of the scene, the first one first.
+ScriptKeySettings ReadKey(StrictMap map, double duration_s, const std::vector<std::string>& sheets) {
   ScriptKeySettings key;
   key.time_s = map.NumberSi("time_s", Range::Between(0, duration_s));
   if (map.Has("world_mm")) {
     key.world_m = map.Vector3Si("world_mm", Range::Between(-1000, 1000));
   } else {
     key.sheet = ToVec2(map.Numbers("sheet", 2, 2, Range::Between(0, 1)));
-    key.on = map.TextOr("on", "", 31);
+    if (sheets.empty()) map.Fail("sheet", "is a place on a sheet, and the scene has none: give `world_mm`");
+    key.on = map.TextOr("on", sheets[0], 31);
+    if (std::ranges::find(sheets, key.on) == sheets.end()) {
+      std::string names;
+      for (const std::string& name : sheets) names += (names.empty() ? "" : ", ") + name;
+      map.Fail("on", "no sheet '" + key.on + "'; the scene has " + names);
+    }
     key.height_m = map.NumberSi("height_mm", Range::Between(-30, 500));
     key.offset_m = map.Vector3Si("offset_mm", key.offset_m, Range::Between(-200, 200));
   }
@@ -269,6 +276,9 @@ ScriptKeySettings ReadKey(StrictMap map, double duration_s) {
 }
 
 void ReadScript(StrictMap map, SceneSettings* scene) {
+  std::vector<std::string> sheets;
+  if (scene->has_organ) sheets.emplace_back("membrane");
+  for (const SheetSettings& sheet : scene->sheets) sheets.push_back(sheet.name);
   scene->script_duration_s = map.NumberSi("duration_s", scene->script_duration_s, Range::Between(0.1, 86400));
   if (const std::string hand = map.TextOr("hand", ""); !hand.empty()) {
     scene->hand = HandNamed(hand);
@@ -280,7 +290,7 @@ void ReadScript(StrictMap map, SceneSettings* scene) {
     const std::string name = "tool" + std::to_string(tool);
     double last_s = -1;
     for (StrictMap& entry : map.Maps(name, 0, kMaxKeys)) {
-      ScriptKeySettings key = ReadKey(entry, scene->script_duration_s);
+      ScriptKeySettings key = ReadKey(entry, scene->script_duration_s, sheets);
       key.tool = tool;
       if (scene->tools[tool].kind == ToolKind::kNone) {
         entry.Fail("time_s", "the scene has no " + name);
@@ -339,7 +349,9 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesys
   };
   ReadBodies(&root, find, &scene);
   if (scene.has_organ) ReadMembrane(root.MapOrDefaults("membrane"), &scene.membrane);
+  const bool has_sheets = scene.has_organ || !scene.sheets.empty();
   for (StrictMap& entry : root.Maps("structures", 0, kMaxStructures)) {
+    if (!has_sheets) entry.Fail("kind", "lies below a sheet, and the scene has none");
     scene.structures.push_back(ReadStructure(entry));
   }
   ReadRender(root.MapOrDefaults("render"), &scene.render);
@@ -355,9 +367,11 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesys
   ReadScript(root.MapOrDefaults("script"), &scene);
   if (auto assessment = root.OptionalMap("assessment")) {
     ReadAssessment(*assessment, &scene.assessment, &scene.planned_line);
+    if (!has_sheets && !scene.planned_line.empty()) {
+      root.Fail("assessment", "`line` lies on a sheet, and the scene has none");
+    }
   }
   // Only sheets can be burnt.
-  const bool has_sheets = scene.has_organ || !scene.sheets.empty();
   if (!has_sheets) scene.node_mask &= ~(1u << static_cast<unsigned>(NodeId::kThermal));
   scene.node_mask = ReadNodes(&root, scene.node_mask);
   if (!has_sheets && (scene.node_mask >> static_cast<unsigned>(NodeId::kThermal) & 1u) != 0) {

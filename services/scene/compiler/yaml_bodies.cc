@@ -14,6 +14,7 @@ using config::StrictMap;
 
 constexpr std::size_t kMostLinePoints = 64;
 constexpr std::size_t kMostAttachments = 400;
+constexpr float kLeastStep_m = 1e-4f;              ///< Between two points of a line.
 constexpr int kBendingRows = 4, kBendingCols = 7;  ///< Largest strides of the hinges, as of the built-in membrane.
 constexpr double kBindingReach_m = 0.0013;         ///< Beyond the gap, likewise.
 
@@ -24,7 +25,7 @@ const StrictMap::Choices<Ends> kEnds = {
 void ReadSwept(StrictMap* map, ShapeSettings* shape) {
   shape->line_m = ReadLine(map);
   for (std::size_t i = 1; i < shape->line_m.size(); ++i) {
-    if (!((shape->line_m[i] - shape->line_m[i - 1]).norm() > 1e-4f)) {
+    if (!((shape->line_m[i] - shape->line_m[i - 1]).norm() > kLeastStep_m)) {
       map->Fail("x_mm", "two points that follow each other are less than 0.1 mm apart");
     }
   }
@@ -93,7 +94,7 @@ SheetSettings ReadSheet(StrictMap map) {
   SheetSettings sheet;
   sheet.name = map.Text("name", 31);
   if (map.Has("over") == map.Has("between")) {
-    map.Fail("name", "needs one of `over` (a body) and `between` (two lines)");
+    map.Fail("name", "needs either `over` (a body) or `between` (two lines)");
   }
   MembraneSettings& grid = sheet.grid;
   grid.rows = 33;
@@ -113,6 +114,14 @@ SheetSettings ReadSheet(StrictMap map) {
     StrictMap between = map.Map("between");
     StrictMap first = between.Map("first"), last = between.Map("last");
     sheet.between_m = {ReadLine(&first), ReadLine(&last)};
+    for (StrictMap* line : {&first, &last}) {
+      const std::vector<Vec3f>& points = sheet.between_m[line == &first ? 0 : 1];
+      for (std::size_t i = 1; i < points.size(); ++i) {
+        if (!((points[i] - points[i - 1]).norm() > kLeastStep_m)) {
+          line->Fail("x_mm", "two points that follow each other are less than 0.1 mm apart");
+        }
+      }
+    }
     grid.gap_m = 0.003;
   }
   ReadInteger(&map, "rows", 2, 5000, &grid.rows);
@@ -174,12 +183,13 @@ void ReadBodies(StrictMap* root, const FindMesh& find, SceneSettings* scene) {
     if (!names.insert(scene->bodies.back().name).second) entry.Fail("name", "is there twice");
   }
   const std::set<std::string> bodies = names;
-  names.insert("membrane");  // Of the organ, whether or not there is one.
+  const std::string organ = scene->has_organ ? ", nor `organ`" : "";
   for (StrictMap& entry : root->Maps("sheets", 0, kMaxSheets - 1)) {
     const SheetSettings& sheet = scene->sheets.emplace_back(ReadSheet(entry));
     if (!sheet.over.empty() && !bodies.contains(sheet.over)) {
       entry.Fail("over", "'" + sheet.over + "' is no body of this scene");
     }
+    if (sheet.name == "membrane") entry.Fail("name", "`membrane` is the name of the sheet over the organ");
     if (!names.insert(sheet.name).second) entry.Fail("name", "is there twice");
   }
   for (StrictMap& entry : root->Maps("attach", 0, kMostAttachments)) {
@@ -187,7 +197,7 @@ void ReadBodies(StrictMap* root, const FindMesh& find, SceneSettings* scene) {
     attach.from = entry.Text("from", 31);
     attach.to = entry.Text("to", 31);
     for (const auto& [key, name] : {std::pair{"from", attach.from}, std::pair{"to", attach.to}}) {
-      if (!bodies.contains(name)) entry.Fail(key, "'" + name + "' is no body of this scene, nor `organ`");
+      if (!bodies.contains(name)) entry.Fail(key, "'" + name + "' is no body of this scene" + organ);
     }
     if (attach.from == attach.to) entry.Fail("to", "must be another body");
     ReadSi(&entry, "reach_mm", Range::Between(0.1, 50), &attach.reach_m);

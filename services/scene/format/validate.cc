@@ -1,5 +1,8 @@
 #include "services/scene/format/validate.h"
 
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "services/base/core/sheets.h"
@@ -54,10 +57,31 @@ void CheckParticles(const SceneView& s) {
   }
 }
 
+/// No patch of the atlas shows two sheets.
+void CheckPlacesInAtlas(const SceneView& s) {
+  const float patch_m = kPatchTexels * s.membrane.texel_m;
+  std::vector<Eigen::AlignedBox2f> places;
+  for (const SheetPart& sheet : s.sheets) {
+    Eigen::AlignedBox2f& place = places.emplace_back();
+    for (std::uint32_t r = sheet.first_row; r < sheet.first_row + sheet.rows; ++r) {
+      for (std::uint32_t c = 0; c < sheet.cols; ++c) {
+        const Vec2f& m = s.membrane_material[std::size_t{r} * s.membrane.cols + c];
+        place.extend(Vec2f(std::floor(m.x() / patch_m), std::floor(m.y() / patch_m)));
+      }
+    }
+    for (std::size_t i = 0; i + 1 < places.size(); ++i) {
+      if (places[i].intersects(place)) {
+        Fail("membrane_material", "sheets ", i, " and ", places.size() - 1, " share a patch of the atlas");
+      }
+    }
+  }
+}
+
 /// Each sheet a rectangle of the grid, with enough rows between two, and all that is outside of them fixed.
 void CheckSheets(const SceneView& s) {
   if (s.sheets.size() > kMaxSheets) Fail("sheets", s.sheets.size(), " of them; valid: at most ", kMaxSheets);
   std::uint64_t least = 0;
+  std::uint32_t widest = 0;
   for (std::size_t i = 0; i < s.sheets.size(); ++i) {
     const SheetPart& sheet = s.sheets[i];
     if (std::memchr(sheet.name, 0, sizeof(sheet.name)) == nullptr) Fail("sheets", "element ", i, ": bad name");
@@ -70,8 +94,14 @@ void CheckSheets(const SceneView& s) {
     }
     if (sheet.over != kNoIndex) CheckIndex("sheets", i, sheet.over, 0, SolidCount(s));
     least = end + kRowsBetweenSheets;
+    widest = std::max(widest, sheet.cols);
   }
   if (s.sheets.empty()) return;
+  const SheetPart& last = s.sheets.back();
+  if (s.sheets[0].first_row != 0 || last.first_row + last.rows != s.membrane.rows || widest != s.membrane.cols) {
+    Fail("sheets", "they do not fill the grid of ", s.membrane.rows, " x ", s.membrane.cols, " nodes");
+  }
+  CheckPlacesInAtlas(s);
   const std::vector<std::uint8_t> absent = AbsentNodes(s);
   for (std::size_t i = 0; i < absent.size(); ++i) {
     if (absent[i] != 0 && s.inverse_mass[s.membrane.first + i] != 0) {

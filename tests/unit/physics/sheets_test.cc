@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "physics_node/energy/elastic_model.h"
 #include "physics_node/simulation/tissue_simulation.h"
 #include "services/scene/builder/build.h"
 #include "tests/support/several_solids.h"
@@ -136,6 +137,30 @@ TEST(SheetsOfOneGrid, AreTheSameOnAnyNumberOfThreads) {
   }
 }
 
+/// What nothing touches sleeps, and is no part of the solve.
+TEST(SheetsOfOneGrid, SleepOneByOne) {
+  const scene::SceneData data = Sheets(PhysicsMode::kAccurate, true);
+  const SceneView scene = data.View();
+  TissueSimulation simulation(scene);
+  for (int i = 0; i < 100; ++i) simulation.Step({});
+  ASSERT_TRUE(simulation.asleep());
+  // The rows after a sheet, which belong to none, count as its.
+  const float part = static_cast<float>(scene.sheets[2].first_row - scene.sheets[1].first_row) /
+                     static_cast<float>(scene.membrane.rows);
+  const Vec3f middle = scene.rest_position[(scene.sheets[1].first_row + 13) * scene.membrane.cols + 7];
+  std::array<ToolInput, kMaxTools> tools{};
+  float most = 0;
+  for (int i = 0; i < 120; ++i) {
+    tools[0] = Pointing(middle + Vec3f(0, 0, 0.003f - 0.00005f * static_cast<float>(i)));
+    simulation.Step(tools);
+    // The first body wakes with the first touch, for half a second.
+    if (i >= 80) most = std::max(most, simulation.awake_part());
+  }
+  EXPECT_GT(FarthestOf(simulation, scene, scene.sheets[1]), 0.001f);
+  EXPECT_GT(most, 0.1f);
+  EXPECT_LE(most, part + 1e-4f);
+}
+
 TEST(SheetsOfOneGrid, ACutDividesOneOnly) {
   const scene::SceneData data = Sheets(PhysicsMode::kAccurate, true);
   const SceneView scene = data.View();
@@ -193,6 +218,35 @@ TEST(SheetsOfOneGrid, MetalTouchesTheOneBelow) {
     EXPECT_LT((contact.material - scene.membrane_material[node]).norm(), 0.004f);
     EXPECT_GT(contact.footprint.gap.size(), 10u);
     EXPECT_TRUE(contact.tented) << "there is air on both sides";
+  }
+}
+
+/// Bindings of a sheet are as stiff as without another one.
+TEST(SheetsOfOneGrid, HaveBindingsOfTheirOwn) {
+  const auto build = [](bool with_other) {
+    scene::Anatomy anatomy;
+    anatomy.solids.push_back(Box("pad", {-0.02, -0.02, 0}, {0.04, 0.04, 0.015}, {8, 8, 3}, 2e4));
+    Fix(&anatomy.solids[0], [](const Vec3d& p) { return p.z() < 1e-6; });
+    anatomy.sheets.push_back(Flat("wide", 17, 17, 0.002, Vec3d(-0.016, -0.016, 0.018)));
+    anatomy.sheets.back().over = 0;
+    if (with_other) {
+      anatomy.sheets.push_back(Flat("fine", 21, 17, 0.0005, Vec3d(-0.004, -0.004, 0.016)));
+      anatomy.sheets.back().over = 0;
+    }
+    return scene::AssembleScene(SettingsOf(PhysicsMode::kAccurate), anatomy);
+  };
+  const scene::SceneData alone = build(false), both = build(true);
+  const std::vector<double> one = BindingStiffness(alone.View()), two = BindingStiffness(both.View());
+  ASSERT_EQ(one.size(), 1u);
+  ASSERT_EQ(two.size(), 2u);
+  EXPECT_GT(one[0], 0);
+  EXPECT_EQ(two[0], one[0]);
+  EXPECT_LT(two[1], 0.5 * one[0]) << "a sixteenth of the area each, three times as short";
+  const ElasticModel model = BuildElasticModel(both.View());
+  const SceneView scene = both.View();
+  for (const ElasticBinding& b : model.bindings) {
+    const bool is_first = (b.membrane - scene.membrane.first) / scene.membrane.cols < scene.sheets[1].first_row;
+    EXPECT_EQ(b.stiffness, two[is_first ? 0 : 1]);
   }
 }
 

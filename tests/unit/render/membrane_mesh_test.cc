@@ -192,6 +192,43 @@ TEST_F(MembraneMeshTest, FatLaidBareEndsWithinTrianglesNotWithThem) {
   EXPECT_EQ(std::count(bared.begin(), bared.end(), 1.0f), 1);
 }
 
+/// A small band that only bindings hold is no crumb.
+TEST(SeveralSheets, ABandThatIsBoundIsDrawn) {
+  scene::SceneData data = SeveralSolids(Vec3f::Zero(), true, true);
+  const SheetPart veil = data.sheets[1];
+  for (std::uint32_t r = veil.first_row; r < veil.first_row + veil.rows; ++r) {
+    for (std::uint32_t c = 0; c < veil.cols; ++c) {
+      data.inverse_mass[data.fixed.membrane.first + r * data.fixed.membrane.cols + c] = 1e4f;
+    }
+  }
+  std::erase_if(data.bindings, [&](const Binding& b) {
+    return b.membrane >= data.fixed.membrane.first + veil.first_row * data.fixed.membrane.cols;
+  });
+  // All but two columns are cut off.
+  const SceneView scene = data.View();
+  TopologyState topology;
+  topology.rows = scene.membrane.rows;
+  topology.cols = scene.membrane.cols;
+  topology.dead_nodes.assign((scene.membrane.node_count() + 7) / 8, 0);
+  topology.dead_edges.assign((3 * scene.membrane.node_count() + 7) / 8, 0);
+  for (std::uint32_t r = veil.first_row; r < veil.first_row + veil.rows; ++r) {
+    for (std::uint32_t c = 0; c + 2 < veil.cols; ++c) SetBit(topology.dead_nodes, r * scene.membrane.cols + c + 2);
+    if (r >= veil.first_row + 12) {
+      for (std::uint32_t c = 0; c < 2; ++c) SetBit(topology.dead_nodes, r * scene.membrane.cols + c);
+    }
+  }
+  const Index node = veil.first_row * scene.membrane.cols;
+  MembraneMesh loose(scene);
+  ASSERT_TRUE(loose.SetTopology(topology));
+  EXPECT_TRUE(loose.node_gone(node));
+  Binding binding = data.bindings[0];
+  binding.membrane = scene.membrane.first + node;
+  data.bindings.push_back(binding);
+  MembraneMesh bound(data.View());
+  ASSERT_TRUE(bound.SetTopology(topology));
+  EXPECT_FALSE(bound.node_gone(node));
+}
+
 TEST(SeveralSheets, AreDrawnApart) {
   const scene::SceneData alone = SeveralSolids(Vec3f::Zero(), true);
   const SceneView alone_scene = alone.View();

@@ -111,7 +111,15 @@ TEST_F(ThreeSheets, LeaveTheMembraneAsItWasAlone) {
     EXPECT_EQ(one.inverse_mass[one.membrane.first + node], scene_.inverse_mass[scene_.membrane.first + node]);
     EXPECT_EQ(one.membrane_material[node], scene_.membrane_material[node]);
   }
-  EXPECT_GT(scene_.bindings.size(), one.bindings.size()) << "the capsule is bound to the pad";
+  for (Index edge = 0; edge < 3 * nodes; ++edge) {
+    ASSERT_EQ(one.membrane_rest_length[edge], scene_.membrane_rest_length[edge]);
+  }
+  std::size_t own = 0;
+  for (const Binding& b : scene_.bindings) {
+    own += b.membrane < scene_.membrane.first + scene_.sheets[1].first_row * scene_.membrane.cols ? 1 : 0;
+  }
+  EXPECT_EQ(own, one.bindings.size());
+  EXPECT_GT(scene_.bindings.size(), own) << "the capsule is bound to the pad";
 }
 
 TEST_F(ThreeSheets, HoldTheSidesThatAreAskedFor) {
@@ -149,7 +157,21 @@ TEST_F(ThreeSheets, AreRefusedWhereTheyDoNotFitTheGrid) {
   EXPECT_EQ(fault([](SceneData* d) { d->sheets[2].cols = 23; }), "sheets");
   EXPECT_EQ(fault([](SceneData* d) { d->sheets[2].name[31] = 'x', std::memset(d->sheets[2].name, 'x', 32); }),
             "sheets");
-  EXPECT_EQ(fault([](SceneData* d) { d->sheets.resize(2); }), "inverse_mass");
+  EXPECT_EQ(fault([](SceneData* d) { d->sheets.resize(2); }), "sheets");
+  EXPECT_EQ(fault([](SceneData* d) { d->fixed.membrane.rows += 1; }), "rest_position");
+  EXPECT_EQ(fault([](SceneData* d) { d->sheets[2].rows -= 1; }), "sheets") << "the last row of the grid is no sheet's";
+  EXPECT_EQ(fault([](SceneData* d) { d->sheets.erase(d->sheets.begin()); }), "sheets") << "nor is the first";
+  EXPECT_EQ(fault([](SceneData* d) { d->sheets[1].over = 2; }), "sheets");
+  EXPECT_EQ(fault([&](SceneData* d) {
+              for (std::uint32_t r = 0; r < 25; ++r) {
+                for (std::uint32_t c = 0; c < 15; ++c) {
+                  const std::size_t from = (scene_.sheets[1].first_row + r) * scene_.membrane.cols + c;
+                  d->membrane_material[from] = d->membrane_material[r * scene_.membrane.cols + c];
+                }
+              }
+            }),
+            "membrane_material")
+      << "two sheets in one place of the atlas";
   const Index gap = scene_.membrane.cols * 42;
   EXPECT_EQ(fault([&](SceneData* d) { d->inverse_mass[scene_.membrane.first + gap] = 1; }), "inverse_mass");
   EXPECT_EQ(fault([&](SceneData* d) { d->membrane_rest_length[3 * gap] = 1e-3f; }), "membrane_rest_length");
@@ -163,7 +185,8 @@ TEST(Sheets, TakeScriptKeysByName) {
   const SceneData data = Build(Three() + key + "band}]}\n");
   ASSERT_EQ(data.script.size(), 1u);
   EXPECT_NEAR(data.script[0].p_W.z(), 0.060f, 1e-4f);
-  EXPECT_NE(RefusalOf(Three() + key + "sail}]}\n").find("no sheet 'sail'; the scene has membrane, capsule, band"),
+  EXPECT_NE(RefusalOf(Three() + key + "sail}]}\n")
+                .find("x.yaml:13: script.tool0[0].on: no sheet 'sail'; the scene has membrane, capsule, band"),
             std::string::npos);
   EXPECT_NE(RefusalOf(kPad + key + "band}]}\n").find("the scene has none"), std::string::npos);
 }
@@ -191,15 +214,29 @@ TEST(Sheets, AScenesTissueMayBeASheetOnly) {
   EXPECT_NE(scene.node_mask & (1u << static_cast<unsigned>(NodeId::kThermal)), 0u);
 }
 
+TEST(Sheets, SayThatNothingKeepsOneInItsPlace) {
+  const std::string loose =
+      "sheets: [{name: veil, held: none, between: {first: {x_mm: [0, 9], y_mm: [0, 0], z_mm: "
+      "[50, 50]}, last: {x_mm: [0, 9], y_mm: [20, 20], z_mm: [50, 50]}}}]\n";
+  const SceneData data = Build(kPad + loose);
+  EXPECT_NE(Describe(data.View(), Measure(data.View())).find("neither held nor bound"), std::string::npos);
+}
+
 TEST(Sheets, AreRefusedWithThePlaceOfTheFault) {
   const auto sheet = [](const std::string& keys) { return std::string(kPad) + "sheets: [{" + keys + "}]\n"; };
   const auto expect = [&](const std::string& lines, const char* part) {
     EXPECT_NE(RefusalOf(lines).find(part), std::string::npos) << RefusalOf(lines);
   };
-  expect(sheet("name: a"), "needs one of `over` (a body) and `between` (two lines)");
+  expect(sheet("name: a"), "needs either `over` (a body) or `between` (two lines)");
+  expect(sheet("name: a, over: pad, facing: [0, 0, 1], width_mm: 20, length_mm: 20, cols: 2"), "lower its binding");
+  expect(sheet("name: a, between: {first: {x_mm: [0, 0], y_mm: [0, 0], z_mm: [9, 9]}, last: {x_mm: [0, 1],\n"
+               "     y_mm: [5, 5], z_mm: [9, 9]}}"),
+         "less than 0.1 mm apart");
   expect(sheet("name: a, over: lung"), "'lung' is no body of this scene");
   expect(sheet("name: pad, over: pad"), "is there twice");
-  expect(sheet("name: membrane, over: pad"), "is there twice");
+  expect(sheet("name: membrane, over: pad"), "is the name of the sheet over the organ");
+  expect(std::string(kPad) + "structures: [{kind: ureter, s: [0, 1], t: [0, 1]}]\n", "lies below a sheet");
+  expect(std::string(kPad) + "assessment: {line: {s: [0, 1], t: [0, 1]}}\n", "lies on a sheet");
   expect(sheet("name: a, over: pad, facing: [0, 0, 1], width_mm: 200, length_mm: 200"), "there is no organ");
   expect(std::string(kPad) + "membrane: {rows: 41}\n", "describe it in `sheets`");
   expect("tools: {}\n", "organ");

@@ -54,6 +54,24 @@ TEST(ShippedScenes, AreListedWithNameAndDescription) {
                                           "seal_and_cut", "small",      "strokes",     "traction", "two_hands"}));
 }
 
+/// Each band is bound at both of its ends, over its whole width.
+TEST(ShippedScenes, AdhesionsJoinTwoLoops) {
+  const SceneData data = CompileScene(kScenes / "adhesions.yaml", {}, {}).data;
+  const SceneView view = data.View();
+  ASSERT_EQ(view.sheets.size(), 3u);
+  for (const SheetPart& band : view.sheets) {
+    std::set<Index> first, last;
+    for (const Binding& b : view.bindings) {
+      const Index row = (b.membrane - view.membrane.first) / view.membrane.cols;
+      if (row < band.first_row || row >= band.first_row + band.rows) continue;
+      (row < band.first_row + band.rows / 2 ? first : last)
+          .insert((b.membrane - view.membrane.first) % view.membrane.cols);
+    }
+    EXPECT_GE(first.size(), band.cols - 2) << band.name;
+    EXPECT_GE(last.size(), band.cols - 2) << band.name;
+  }
+}
+
 TEST(ShippedScenes, SayTheSameAsThePresets) {
   EXPECT_EQ(CompileScene(kScenes / "built-in.yaml", {}, {}).data.fixed.hash, BuildProcedural(BuiltIn()).fixed.hash);
   EXPECT_EQ(CompileScene(kScenes / "small.yaml", {}, {}).data.fixed.hash, BuildProcedural(Small()).fixed.hash);
