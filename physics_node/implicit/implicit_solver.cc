@@ -270,6 +270,16 @@ void ImplicitSolver::SetVelocity(ParticleRef at, const Vec3f& v) {
   PutField(state_.velocity.data(), at, v);
   state_.regions.Wake(model_.partition.Of(at));
 }
+void ImplicitSolver::SleepStill() {
+  state_.regions.SleepStill([&](int region) {
+    bool still = true;
+    ForPieces(model_.layout, model_.partition.Extent(region), [&](std::size_t first, std::size_t count) {
+      const float* velocity = state_.velocity.data() + first;
+      still = still && std::all_of(velocity, velocity + count, [](float v) { return v == 0.0f; });
+    });
+    return still;
+  });
+}
 void ImplicitSolver::Stop() {
   std::fill_n(state_.velocity.data(), state_.velocity.size(), 0.0f);
   state_.regions.SleepOthers();

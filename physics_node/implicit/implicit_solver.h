@@ -58,6 +58,8 @@ class ImplicitSolver {
   /// Force of the tissue on a particle that the last substep held [N]; undefined for others.
   [[nodiscard]] Vec3f ForceOn(ParticleRef at) const;
   [[nodiscard]] Vec3f Velocity(ParticleRef at) const;
+  /// Bodies that nothing moves fall asleep, as they were when a checkpoint was written.
+  void SleepStill();
   void Stop();
   /// Velocities from two states a step apart, for a restart. Wakes.
   void SetVelocity(ParticleRef at, const Vec3f& v);

@@ -155,9 +155,20 @@ void Regions::WakeAll() {
 }
 
 void Regions::SleepOthers() {
+  SleepStill([](int) { return true; });
+}
+
+void Regions::SleepStill(const std::function<bool(int region)>& is_still) {
+  if (bodies_.empty()) return;
+  std::vector<std::uint8_t> still(bodies_.size(), 1);
+  still[0] = 0;
+  for (int region = 0; region < partition_.count(); ++region) {
+    std::uint8_t& body = still[static_cast<std::size_t>(partition_.BodyOf(region))];
+    body = body != 0 && is_still(region) ? 1 : 0;
+  }
   for (int region = 0; region < partition_.count(); ++region) {
     std::uint8_t& awake = awake_[static_cast<std::size_t>(region)];
-    if (partition_.BodyOf(region) == 0 || awake == 0) continue;
+    if (still[static_cast<std::size_t>(partition_.BodyOf(region))] == 0 || awake == 0) continue;
     awake = 0;
     changed_ = true;
   }

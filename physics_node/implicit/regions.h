@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -115,6 +116,8 @@ class Regions {
   void WakeAll();
   /// All bodies but the membrane with the organ fall asleep: nothing has moved for a while.
   void SleepOthers();
+  /// All bodies but the membrane with the organ whose regions are all still fall asleep.
+  void SleepStill(const std::function<bool(int region)>& is_still);
   /// At the end of a substep of h: puts to sleep and wakes by the largest speed of each region [m/s].
   void UpdateSleep(std::span<const float> speed, float h);
   /// True when the computed regions have changed since the last call; then the tasks are new.

@@ -148,6 +148,7 @@ std::optional<NodeMemory> ReadCheckpoint(std::span<const std::byte> payload, Tis
   if (!simulation->Restore(xyz, previous, memory)) {
     return std::nullopt;
   }
+  simulation->LetStillBodiesSleep();
   return NodeMemory{header.max_displacement_m, header.contact_time_s};
 }
 

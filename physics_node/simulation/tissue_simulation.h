@@ -126,6 +126,10 @@ class TissueSimulation {
   /// Continues from a checkpoint: positions in scene order, x y z interleaved. False, with the state unchanged, if it
   /// does not fit the scene or is out of bounds.
   bool Restore(std::span<const float> xyz, std::span<const float> previous_xyz, const SimulationMemory& memory);
+  /// After Restore: in mode accurate, bodies that were at rest are not computed until something moves them.
+  void LetStillBodiesSleep() {
+    if (implicit_) implicit_->SleepStill();
+  }
 
  private:
   template <class Body>

@@ -168,6 +168,7 @@ void GraspCutFuzz::DoRestart() {
   const SimulationMemory memory = simulation_->Save();
   simulation_ = std::make_unique<TissueSimulation>(scene_);
   simulation_->Restore(xyz, previous, memory);
+  simulation_->LetStillBodiesSleep();
   for (Index i = Below(3); i > 0; --i) {
     Step();
   }

@@ -221,6 +221,36 @@ TEST_F(OnSeveralSolids, ThatNothingTouchesSleepWhileTheMembraneMovesAsWithoutThe
   }
 }
 
+/// A restart does not wake what was at rest; what moved goes on.
+TEST_F(OnSeveralSolids, ThatWereAtRestSleepAfterARestart) {
+  TissueSimulation simulation(scene_), restarted(scene_), woken(scene_);
+  std::array<ToolInput, kMaxTools> tools{};
+  tools[1].present = true;
+  tools[1].pose.q_WT = Quatf(0, 1, 0, 0);
+  const Vec3f middle = scene_.rest_position[scene_.membrane.first + scene_.membrane.node_count() / 2];
+  for (int i = 0; i < 100; ++i) {
+    tools[1].pose.p_WT = middle + Vec3f(0, 0, 0.004f - 0.0001f * static_cast<float>(i));
+    simulation.Step(tools);
+  }
+  std::vector<float> xyz(3 * scene_.rest_position.size()), previous(xyz.size());
+  simulation.particles().CopyPositions(xyz);
+  simulation.particles().CopyPrevious(previous);
+  const SimulationMemory memory = simulation.Save();
+  ASSERT_TRUE(restarted.Restore(xyz, previous, memory));
+  restarted.LetStillBodiesSleep();
+  ASSERT_TRUE(woken.Restore(xyz, previous, memory));
+  restarted.Step(tools);
+  woken.Step(tools);
+  const float of_first = static_cast<float>(scene_.solids[0].vertex_count + scene_.membrane.node_count()) /
+                         static_cast<float>(scene_.rest_position.size());
+  EXPECT_LE(restarted.awake_part(), of_first + 1e-5f);
+  EXPECT_GT(restarted.awake_part(), 0.1f);
+  EXPECT_EQ(woken.awake_part(), 1.0f);
+  for (Index v = scene_.solids[kPad].first_vertex; v < scene_.tube_vertex_count; ++v) {
+    ASSERT_EQ(At(restarted, v), At(simulation, v));
+  }
+}
+
 TEST_F(UnderGravity, AreTheSameOnAnyNumberOfThreads) {
   TissueSimulation one(scene_, 1), three(scene_, 3);
   three.LetThreadsHelp(true);
