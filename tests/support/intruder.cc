@@ -33,7 +33,7 @@ namespace fs = std::filesystem;
 constexpr std::time_t kDay_s = 24 * 3600;
 // Long enough to start a process, short enough for a test to wait for.
 constexpr std::time_t kShortLife_s = 2;
-constexpr double kPatience_s = 30;
+constexpr double kPatience_s = 60;
 constexpr int kLongestRead_ms = 5000;
 constexpr std::chrono::seconds kShortestForgery(5);
 
