@@ -7,6 +7,7 @@
 #include "services/scene/builder/build.h"
 #include "tests/numerics/physics/tissue_validator.h"
 #include "tests/support/several_solids.h"
+#include "tests/support/whole_topology.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -41,17 +42,6 @@ scene::SceneData TinyScene(bool two_graspers, bool several_solids) {
                         : scene::BuildProcedural(settings);
 }
 
-TopologyState Whole(const SceneView& scene) {
-  TopologyState state;
-  const std::size_t nodes = scene.membrane.node_count();
-  state.rows = scene.membrane.rows;
-  state.cols = scene.membrane.cols;
-  state.dead_nodes.assign((nodes + 7) / 8, 0);
-  state.dead_edges.assign((3 * nodes + 7) / 8, 0);
-  state.shrink.assign(3 * nodes, 0);
-  return state;
-}
-
 }  // namespace
 
 GraspCutFuzz::GraspCutFuzz(unsigned seed, bool several_solids)
@@ -60,7 +50,7 @@ GraspCutFuzz::GraspCutFuzz(unsigned seed, bool several_solids)
       data_(TinyScene(seed % 2 == 1, several_solids)),
       scene_(data_.View()),
       simulation_(std::make_unique<TissueSimulation>(scene_)),
-      topology_(Whole(scene_)) {}
+      topology_(WholeTopology(scene_)) {}
 
 void GraspCutFuzz::Step() {
   // A node that is late simulates up to three periods in a step.
@@ -188,7 +178,7 @@ std::string GraspCutFuzz::Operate() {
   } else if (what < 0.98f) {
     if (++cuts_since_whole_ > kCutsPerSheet) {
       const std::uint64_t revision = topology_.revision;
-      topology_ = Whole(scene_);
+      topology_ = WholeTopology(scene_);
       topology_.revision = revision;
       cuts_since_whole_ = 0;
       ++counts_.revivals;

@@ -5,20 +5,10 @@
 
 #include "physics_node/simulation/script_player.h"
 #include "services/scene/builder/build.h"
+#include "tests/support/whole_topology.h"
 
 namespace fulcrum::physics {
 namespace {
-
-TopologyState Untouched(const SceneView& scene) {
-  TopologyState state;
-  const std::size_t nodes = scene.membrane.node_count();
-  state.rows = scene.membrane.rows;
-  state.cols = scene.membrane.cols;
-  state.dead_nodes.assign((nodes + 7) / 8, 0);
-  state.dead_edges.assign((3 * nodes + 7) / 8, 0);
-  state.shrink.assign(3 * nodes, 0);
-  return state;
-}
 
 class Stress : public testing::TestWithParam<unsigned> {
  protected:
@@ -45,7 +35,7 @@ class Stress : public testing::TestWithParam<unsigned> {
 TEST_P(Stress, WildToolsAndWildCuts) {
   std::mt19937 random(GetParam());
   std::uniform_real_distribution<float> unit(0, 1);
-  TopologyState topology = Untouched(scene_);
+  TopologyState topology = WholeTopology(scene_);
   std::array<ToolInput, kMaxTools> tools = ScriptedTools(scene_, 0.0);
   std::array<Vec3f, kMaxTools> aim{Vec3f::Zero(), Vec3f::Zero()};
   for (int i = 0; i < 1200; ++i) {

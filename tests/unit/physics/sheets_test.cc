@@ -10,6 +10,7 @@
 #include "physics_node/simulation/tissue_simulation.h"
 #include "services/scene/builder/build.h"
 #include "tests/support/several_solids.h"
+#include "tests/support/whole_topology.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -167,12 +168,7 @@ TEST(SheetsOfOneGrid, ACutDividesOneOnly) {
   TissueSimulation simulation(scene);
   const SheetPart& second = scene.sheets[1];
   const Index nodes = scene.membrane.node_count();
-  TopologyState topology;
-  topology.rows = scene.membrane.rows;
-  topology.cols = scene.membrane.cols;
-  topology.dead_nodes.assign((nodes + 7) / 8, 0);
-  topology.dead_edges.assign((3 * nodes + 7) / 8, 0);
-  topology.shrink.assign(3 * nodes, 0);
+  TopologyState topology = WholeTopology(scene);
   // Two cuts across: what is between them is held by nothing.
   for (const std::uint32_t row : {second.first_row + 9, second.first_row + 15}) {
     for (std::uint32_t c = 0; c < second.cols; ++c) {

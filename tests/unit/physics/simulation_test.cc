@@ -9,6 +9,7 @@
 #include "physics_node/simulation/tissue_simulation.h"
 #include "services/scene/builder/build.h"
 #include "services/transport/bus/gate.h"
+#include "tests/support/whole_topology.h"
 #include "tests/unit/physics/sheet_scene.h"
 
 namespace fulcrum::physics {
@@ -84,13 +85,7 @@ TEST_F(OnSmallScene, ATopologyChangeWakes) {
     simulation.Step({});
   }
   ASSERT_TRUE(simulation.asleep());
-  TopologyState state;
-  const std::size_t nodes = scene_.membrane.node_count();
-  state.rows = scene_.membrane.rows;
-  state.cols = scene_.membrane.cols;
-  state.dead_nodes.assign((nodes + 7) / 8, 0);
-  state.dead_edges.assign((3 * nodes + 7) / 8, 0);
-  state.shrink.assign(3 * nodes, 0);
+  TopologyState state = WholeTopology(scene_);
   EXPECT_EQ(simulation.ApplyTopology(state), 0);
   EXPECT_TRUE(simulation.asleep());
   state.shrink[3 * (30 * 25 + 12)] = 200;
@@ -99,14 +94,8 @@ TEST_F(OnSmallScene, ATopologyChangeWakes) {
 }
 
 TEST_F(OnSmallScene, ASheetCutInManyPlacesComesToRest) {
-  const std::size_t nodes = scene_.membrane.node_count();
   for (const unsigned seed : {1u, 2u, 3u}) {
-    TopologyState state;
-    state.rows = scene_.membrane.rows;
-    state.cols = scene_.membrane.cols;
-    state.dead_nodes.assign((nodes + 7) / 8, 0);
-    state.dead_edges.assign((3 * nodes + 7) / 8, 0);
-    state.shrink.assign(3 * nodes, 0);
+    TopologyState state = WholeTopology(scene_);
     std::mt19937 random(seed);
     for (Index row = 20; row < 45; ++row) {
       for (Index edge = 3 * (row * state.cols + 6); edge < 3 * (row * state.cols + 18); ++edge) {

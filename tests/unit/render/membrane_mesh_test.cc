@@ -8,6 +8,7 @@
 #include "services/base/core/sheets.h"
 #include "services/scene/builder/build.h"
 #include "tests/support/several_solids.h"
+#include "tests/support/whole_topology.h"
 #include "tests/unit/render/interleaved.h"
 
 namespace fulcrum::render {
@@ -206,11 +207,7 @@ TEST(SeveralSheets, ABandThatIsBoundIsDrawn) {
   });
   // All but two columns are cut off.
   const SceneView scene = data.View();
-  TopologyState topology;
-  topology.rows = scene.membrane.rows;
-  topology.cols = scene.membrane.cols;
-  topology.dead_nodes.assign((scene.membrane.node_count() + 7) / 8, 0);
-  topology.dead_edges.assign((3 * scene.membrane.node_count() + 7) / 8, 0);
+  TopologyState topology = WholeTopology(scene);
   for (std::uint32_t r = veil.first_row; r < veil.first_row + veil.rows; ++r) {
     for (std::uint32_t c = 0; c + 2 < veil.cols; ++c) SetBit(topology.dead_nodes, r * scene.membrane.cols + c + 2);
     if (r >= veil.first_row + 12) {
@@ -251,11 +248,7 @@ TEST(SeveralSheets, AreDrawnApart) {
   for (const Vec3f& p : scene.rest_position) xyz.insert(xyz.end(), p.data(), p.data() + 3);
   mesh.Update(xyz);
   // A slit along the second sheet's rim: the ghosts continue it, and do not reach for the other one.
-  TopologyState topology;
-  topology.rows = scene.membrane.rows;
-  topology.cols = scene.membrane.cols;
-  topology.dead_nodes.assign((scene.membrane.node_count() + 7) / 8, 0);
-  topology.dead_edges.assign((3 * scene.membrane.node_count() + 7) / 8, 0);
+  TopologyState topology = WholeTopology(scene);
   for (std::uint32_t c = 0; c < scene.sheets[1].cols; ++c) {
     for (const std::size_t d : {1u, 2u}) {
       SetBit(topology.dead_edges, 3 * std::size_t{scene.sheets[1].first_row * scene.membrane.cols + c} + d);
