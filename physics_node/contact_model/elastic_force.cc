@@ -27,6 +27,7 @@ ElasticForce::ElasticForce(const TissueScene& scene, const TissueModel* model, c
   membrane_stiffness_.assign(3 * std::size_t{scene.membrane.node_count()}, 0.0f);
   const std::vector<std::size_t> sheet = SheetOfRows(scene);
   std::vector<double> sheet_area(sheet.empty() ? 0 : sheet.back() + 1);
+  const std::vector<SheetProperties> properties = PropertiesOfRows(scene);
   for (Index t = 0; t < scene.membrane.triangle_count(); ++t) {
     if (!HasTriangle(scene, t)) continue;
     const auto n = model->TriangleNodes(t);
@@ -37,7 +38,7 @@ ElasticForce::ElasticForce(const TissueScene& scene, const TissueModel* model, c
       const Index edge = 3 * a + (b - a == 1 ? 0u : b - a == cols ? 1u : 2u);
       const double length_sq = (x(first + b) - x(first + a)).squaredNorm();
       membrane_stiffness_[edge] +=
-          static_cast<float>(kTriangleShare * scene.physics.membrane_Et_N_per_m * area / length_sq);
+          static_cast<float>(kTriangleShare * properties[n[0] / cols].Et_N_per_m * area / length_sq);
     }
   }
   const std::vector<Index> solid = SolidOfVertices(scene);
@@ -71,10 +72,11 @@ ElasticForce::ElasticForce(const TissueScene& scene, const TissueModel* model, c
       length[of] += binding.rest_length;
       count[of] += 1;
     }
-    for (const std::size_t of : sheet) {
+    for (std::size_t row = 0; row < sheet.size(); ++row) {
+      const std::size_t of = sheet[row];
       const double n = std::max(count[of], 1.0);
       binding_stiffness_.push_back(
-          static_cast<float>(static_cast<double>(scene_.physics.fat_youngs_modulus_Pa) * (sheet_area[of] / n) /
+          static_cast<float>(static_cast<double>(properties[row].fat_youngs_modulus_Pa) * (sheet_area[of] / n) /
                              std::max(length[of] / n, kLeastFatLength)));
     }
   }

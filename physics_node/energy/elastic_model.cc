@@ -37,7 +37,7 @@ double Cotangent(const Vec3d& at, const Vec3d& p, const Vec3d& q) {
 /// with l_c l_r >= kLeastCell l^2, and less for edges below kLeastEdge of the mean length.
 void AddSprings(const TissueScene& scene, ElasticModel* model) {
   const Index first = scene.membrane.first, rows = scene.membrane.rows, cols = scene.membrane.cols;
-  const double Et = scene.physics.membrane_Et_N_per_m, shrink = 1.0 / (1.0 + scene.physics.membrane_prestrain);
+  const double shrink = 1.0 / (1.0 + scene.physics.membrane_prestrain);
   model->springs.assign(scene.membrane_rest_length.size(), {});
   // Rest length of the edge of a node in a direction, and the width of the strip of sheet that an edge stands for.
   const auto length = [&](Index row, Index col, int direction) {
@@ -68,7 +68,9 @@ void AddSprings(const TissueScene& scene, ElasticModel* model) {
   for (std::size_t of = 0; of < means.size(); ++of) {
     for (std::size_t d = 0; d < 3; ++d) means[of][d] /= std::max(counts[of][d], 1.0);
   }
+  const std::vector<SheetProperties> properties = PropertiesOfRows(scene);
   for (Index row = 0; row < rows; ++row) {
+    const double Et = properties[row].Et_N_per_m;
     for (Index col = 0; col < cols; ++col) {
       const Index node = row * cols + col;
       for (int d = 0; d < 3; ++d) {
@@ -92,6 +94,7 @@ void AddSprings(const TissueScene& scene, ElasticModel* model) {
 
 void AddTriangles(const TissueScene& scene, ElasticModel* model) {
   const Index rows = scene.membrane.rows, cols = scene.membrane.cols;
+  const std::vector<SheetProperties> properties = PropertiesOfRows(scene);
   for (Index row = 0; row + 1 < rows; ++row) {
     for (Index col = 0; col + 1 < cols; ++col) {
       if (!HasCell(scene, row, col)) continue;
@@ -103,7 +106,7 @@ void AddTriangles(const TissueScene& scene, ElasticModel* model) {
         for (std::size_t i = 0; i < 3; ++i) {
           lengths[i] = model->springs[triangle.edges[i]].rest_length;
         }
-        triangle.rest = RestOfTriangle(lengths, scene.physics.membrane_Et_N_per_m);
+        triangle.rest = RestOfTriangle(lengths, properties[row].Et_N_per_m);
         model->triangles.push_back(triangle);
       }
     }
@@ -117,6 +120,7 @@ void AddTriangles(const TissueScene& scene, ElasticModel* model) {
 /// with the flexural rigidity B [N m], the areas A [m^2] and c_ij the cotangent of the angle at x_i in the triangle of
 /// x_j.
 void AddHinges(const TissueScene& scene, ElasticModel* model) {
+  const std::vector<SheetProperties> properties = PropertiesOfRows(scene);
   for (const BendingConstraint& bend : scene.bending) {
     std::array<Vec3d, 4> x;
     for (std::size_t i = 0; i < 4; ++i) {
@@ -128,7 +132,7 @@ void AddHinges(const TissueScene& scene, ElasticModel* model) {
     const double c02 = Cotangent(x[0], x[1], x[2]), c12 = Cotangent(x[1], x[0], x[2]);
     const double c03 = Cotangent(x[0], x[1], x[3]), c13 = Cotangent(x[1], x[0], x[3]);
     hinge.c = {c12 + c13, c02 + c03, -c02 - c12, -c03 - c13};
-    hinge.stiffness = 3.0 * scene.physics.membrane_bending_Nm / (a0 + a1);
+    hinge.stiffness = 3.0 * properties[(bend.v[0] - scene.membrane.first) / scene.membrane.cols].bending_Nm / (a0 + a1);
     // One hinge per constraint of the scene; it is inactive where its triangles have no area.
     const bool sound = std::isfinite(hinge.stiffness) &&
                        std::all_of(hinge.c.begin(), hinge.c.end(), [](double c) { return std::isfinite(c); });
@@ -242,9 +246,10 @@ std::vector<double> BindingStiffness(const TissueScene& scene) {
     length[of] += binding.rest_length;
     count[of] += 1;
   }
+  const std::vector<SheetPart> parts = SheetsOf(scene);
   for (std::size_t of = 0; of < sheets; ++of) {
     const double n = std::max(count[of], 1.0);
-    stiffness.push_back(scene.physics.fat_youngs_modulus_Pa * (area[of] / n) /
+    stiffness.push_back(PropertiesOf(parts[of], scene.physics).fat_youngs_modulus_Pa * (area[of] / n) /
                         std::max(length[of] / n, kLeastBindingLength));
   }
   return stiffness;

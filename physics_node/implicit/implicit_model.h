@@ -18,7 +18,7 @@ struct SheetModel {
 
   std::array<FloatArray, 3> axial;         ///< By direction: tension per strain [N]; 0 where the grid has no edge.
   bool continuum;                          ///< Cells have triangles.
-  float Et;                                ///< Modulus times thickness [N/m].
+  std::vector<float> Et;                   ///< Modulus times thickness, by row [N/m].
   std::array<FloatArray, 3> inverse_rest;  ///< By direction: 1 / L [1/m].
   FloatArray mass;                         ///< [kg]
   float stiffening;                        ///< c of tension = axial (e + c e^3).

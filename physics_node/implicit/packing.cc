@@ -51,11 +51,11 @@ static_assert(kLeastSheetDeterminant == static_cast<float>(kLeastDeterminant));
 
 SheetModel::SheetModel(const TissueScene& scene, const ElasticModel& model, const ParticleStore& particles)
     : continuum(!model.triangles.empty()),
-      Et(scene.physics.membrane_Et_N_per_m),
       mass(particles.layout().plane()),
       stiffening(static_cast<float>(model.spring_stiffening())),
       triangle_stiffening(static_cast<float>(model.triangle_stiffening())),
       rest_scale(1.0f / (1.0f + scene.physics.membrane_prestrain)) {
+  for (const SheetProperties& of_row : PropertiesOfRows(scene)) Et.push_back(of_row.Et_N_per_m);
   const GridLayout& layout = particles.layout();
   for (std::size_t d = 0; d < 3; ++d) {
     inverse_rest[d] = FloatArray(layout.plane());

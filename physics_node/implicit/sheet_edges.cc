@@ -119,7 +119,8 @@ void SheetEdges::UpdateTriangle(const TrianglePlace& triangle) {
     whole = whole && axial_[d][edge] > 0.0f;
     lengths[d] = 1.0 / static_cast<double>(inverse_rest_[d][edge]);
   }
-  const TriangleRest rest = whole ? RestOfTriangle(lengths, static_cast<double>(model_.sheet.Et)) : TriangleRest{};
+  const TriangleRest rest =
+      whole ? RestOfTriangle(lengths, static_cast<double>(model_.sheet.Et[triangle.row])) : TriangleRest{};
   triangle_[triangle.half][at] = static_cast<float>(rest.stiffness);
   for (std::size_t d = 0; d < 3; ++d) {
     trace_[triangle.half][d][at] = static_cast<float>(rest.trace[d]);

@@ -348,6 +348,7 @@ void PhysicsNode::Measure() {
   figures_.grasped.store(simulation_.held_particles(), std::memory_order_relaxed);
   figures_.torn_edges.store(simulation_.tears().torn_count(), std::memory_order_relaxed);
   figures_.stretch.store(simulation_.tears().largest_stretch(), std::memory_order_relaxed);
+  figures_.tear_stretch.store(simulation_.tears().limit(), std::memory_order_relaxed);
   figures_.largest_stretch.store(simulation_.tears().largest_stretch_ever(), std::memory_order_relaxed);
   std::uint32_t limited = 0;
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
@@ -420,7 +421,8 @@ void PhysicsNode::FillHealth(Health* health) const {
                            std::to_string(static_cast<int>(ContactProbe::kForceCap_N)) + " N";
     }
   }
-  const float limit = scene_.physics.tear_stretch, stretch = figures_.stretch.load(std::memory_order_relaxed);
+  const float limit = figures_.tear_stretch.load(std::memory_order_relaxed),
+              stretch = figures_.stretch.load(std::memory_order_relaxed);
   if (limit > 0 && stretch > TearWatch::kNear * limit) {
     char text[64];
     std::snprintf(text, sizeof(text), "membrane near tearing: stretch %.2f of %.2f", static_cast<double>(stretch),

@@ -31,7 +31,8 @@ void TearWatch::Tear(Index edge) {
 
 void TearWatch::TearBareEdges() {
   for (const Index edge : bare_edges_) {
-    if (EdgeStretch2(edge) >= limit_ * limit_) Tear(edge);
+    const float limit = limits_[edge / 3 / cols_];
+    if (EdgeStretch2(edge) >= limit * limit) Tear(edge);
   }
 }
 
@@ -102,7 +103,7 @@ void TearWatch::Crack(std::uint32_t row, std::uint32_t col) {
     Place at = middle;
     for (int i = 0; i < most_steps; ++i) {
       at = {at.col + step * w.col, at.row + step * w.row};
-      if (!(StretchAt(at) >= kNear * limit_)) break;
+      if (!(StretchAt(at) >= kNear * limits_[row])) break;
     }
     ends[side] = at;
   }

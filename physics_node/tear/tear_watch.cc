@@ -25,11 +25,18 @@ constexpr float kLeastAreaShare = 0.05f;
 constexpr float kMaxWindow = 16;
 /// Movement that is set where a row must be examined [m]: more than any row needs to reach the limit.
 constexpr float kForceEvaluation = 1.0f;
+/// Limit of a sheet that does not tear: more than any stretch.
+constexpr float kNever = 1e6f;
 
 std::uint32_t CountBits(std::span<const std::uint8_t> bits) {
   std::uint32_t count = 0;
   for (const std::uint8_t byte : bits) count += static_cast<std::uint32_t>(std::popcount(byte));
   return count;
+}
+
+/// Whether a value is a larger part of its limit than another one of its own.
+bool IsNearer(float value, float limit, float other, float other_limit) {
+  return limit == other_limit ? value > other : value * other_limit > other * limit;
 }
 
 /// Weights of the cells to one side of a node, by distance: 1 within the window, the last cell in proportion.
@@ -46,13 +53,15 @@ TearWatch::TearWatch(const TissueScene& scene, const TissueModel* model, const P
     : scene_(scene),
       model_(model),
       particles_(particles),
-      limit_(scene.physics.tear_stretch),
       to_rest_(1.0f + scene.physics.membrane_prestrain),
       rows_(scene.membrane.rows),
       cols_(scene.membrane.cols) {
   torn_.assign((3 * std::size_t{rows_} * cols_ + 7) / 8, 0);
-  if (limit_ == 0.0f || rows_ < 2 || cols_ < 2) {
-    limit_ = 0;
+  for (const SheetProperties& of_row : PropertiesOfRows(scene)) {
+    limits_.push_back(of_row.tear_stretch > 0.0f ? of_row.tear_stretch : kNever);
+  }
+  if (std::ranges::all_of(limits_, [](float limit) { return limit == kNever; })) {
+    limits_.clear();
     return;
   }
   const std::size_t cells = std::size_t{rows_ - 1} * cols_;  // With a padding cell at the end of each row.
@@ -130,7 +139,7 @@ void TearWatch::RefreshTriangle(Index triangle) {
 
 void TearWatch::Follow() {
   schedule_.topology_changed = true;
-  if (limit_ == 0.0f) return;
+  if (limits_.empty()) return;
   for (const Index edge : model_->edited_edges()) {
     if (!(scene_.membrane_rest_length[edge] > 0.0f)) continue;
     // All triangles around both ends: a dead node also disables triangles of which it edits no edge.
@@ -178,26 +187,28 @@ bool TearWatch::Paused() {
 }
 
 void TearWatch::RowsMoved(std::uint32_t first, std::uint32_t end, float moved) {
-  if (limit_ == 0.0f) return;
+  if (limits_.empty()) return;
   for (std::uint32_t row = first > 0 ? first - 1 : 0; row < std::min(end, rows_ - 1); ++row)
     cell_rows_.moved[row] += moved;
 }
 
 bool TearWatch::Evaluate(std::uint64_t step) {
-  if (limit_ == 0.0f || step % kEvery != 0) return false;
+  if (limits_.empty() || step % kEvery != 0) return false;
   schedule_.step = step;
   ++pass_;
-  const float near = kNear * limit_ / to_rest_, near2 = near * near;
+  const auto near = [this](std::uint32_t row) { return kNear * limits_[row] / to_rest_; };
   const bool all = step % kEveryAll == 0;
   float largest2 = 0;
   std::uint32_t largest_row = 0;
   for (std::uint32_t row = 0; row + 1 < rows_; ++row) {
-    const bool may_be_near = std::sqrt(cell_rows_.stretch2[row]) + cell_rows_.gain[row] * cell_rows_.moved[row] >= near;
+    const bool may_be_near =
+        std::sqrt(cell_rows_.stretch2[row]) + cell_rows_.gain[row] * cell_rows_.moved[row] >= near(row);
     if (cell_rows_.moved[row] > 0.0f && (all || may_be_near)) {
       cell_rows_.stretch2[row] = LargestInRow(row);
       cell_rows_.moved[row] = 0;
     }
-    if (cell_rows_.stretch2[row] > largest2) {
+    const float limit = limits_[row], limit_there = limits_[largest_row];
+    if (IsNearer(cell_rows_.stretch2[row], limit * limit, largest2, limit_there * limit_there)) {
       largest2 = cell_rows_.stretch2[row];
       largest_row = row;
     }
@@ -206,13 +217,13 @@ bool TearWatch::Evaluate(std::uint64_t step) {
   std::uint32_t worst_row = 0, worst_col = 0, done = 0;
   largest_ = 0;
   for (std::uint32_t row = 0; row + 1 < rows_; ++row) {
-    if (row != largest_row && !(cell_rows_.stretch2[row] >= near2)) continue;
+    if (row != largest_row && !(cell_rows_.stretch2[row] >= near(row) * near(row))) continue;
     const auto reach = static_cast<std::uint32_t>(scales_[sheet_of_[row]].by_rows.size());
     const std::uint32_t end = std::min(row + reach + 1, rows_);
     for (std::uint32_t r = std::max(done, row + 1 > reach ? row + 1 - reach : 0); r < end; ++r) {
       SmoothRow(r);
       for (std::uint32_t c = 0; c < cols_; ++c) {
-        if (smooth_.values[r * cols_ + c] > largest_) {
+        if (IsNearer(smooth_.values[r * cols_ + c], limits_[r], largest_, limits_[worst_row])) {
           largest_ = smooth_.values[r * cols_ + c];
           worst_row = r;
           worst_col = c;
@@ -221,12 +232,13 @@ bool TearWatch::Evaluate(std::uint64_t step) {
     }
     done = std::max(done, end);
   }
+  limit_there_ = limits_[worst_row];
   const bool paused = Paused();
   if (schedule_.step >= schedule_.quiet_until) largest_ever_ = std::max(largest_ever_, largest_);
   if (paused) return false;
   const std::uint32_t before = torn_count_;
   TearBareEdges();
-  if (largest_ >= limit_) Crack(worst_row, worst_col);
+  if (largest_ >= limit_there_) Crack(worst_row, worst_col);
   if (torn_count_ != before) schedule_.torn_step = schedule_.step;
   return torn_count_ != before;
 }

@@ -62,12 +62,12 @@ class TearWatch {
   /// Edges (3 * node + direction) that have torn since the start: bits as in TearState.
   [[nodiscard]] std::span<const std::uint8_t> torn() const { return torn_; }
   [[nodiscard]] std::uint32_t torn_count() const { return torn_count_; }
-  /// lambda at the most stretched place, at the last examination.
+  /// lambda at the last examination where it comes nearest to the limit, in proportion.
   [[nodiscard]] float largest_stretch() const { return largest_; }
-  /// The largest since the start.
+  /// The limit there.
+  [[nodiscard]] float limit() const { return limit_there_; }
+  /// The largest of these since the start.
   [[nodiscard]] float largest_stretch_ever() const { return largest_ever_; }
-  /// tear_stretch; 0: nothing tears.
-  [[nodiscard]] float limit() const { return limit_; }
 
   /// False if a bit is set for an edge that this mesh does not have.
   [[nodiscard]] bool Fits(std::span<const std::uint8_t> torn) const;
@@ -112,7 +112,8 @@ class TearWatch {
   TissueScene scene_;
   const TissueModel* model_;
   const ParticleStore* particles_;
-  float limit_, to_rest_;  ///< to_rest_: 1 + prestrain, the stretch in the rest shape.
+  float to_rest_;              ///< 1 + prestrain, the stretch in the rest shape.
+  std::vector<float> limits_;  ///< By row: tear_stretch of its sheet; empty: nothing tears.
   std::uint32_t rows_, cols_;
   /// By half (0: n00 n01 n11, 1: n00 n11 n10) planes over the cells.
   struct MetricPlanes {
@@ -155,7 +156,7 @@ class TearWatch {
     bool topology_changed = false, restored = false;  ///< Since the last examination.
   };
   Schedule schedule_;
-  float largest_ = 0, largest_ever_ = 0;
+  float largest_ = 0, largest_ever_ = 0, limit_there_ = 0;
 };
 
 }  // namespace fulcrum::physics

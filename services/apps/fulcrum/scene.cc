@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <iostream>
 
@@ -6,6 +7,7 @@
 #include "services/base/config/json_schema.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/install_places.h"
+#include "services/scene/compiler/materials.h"
 #include "services/scene/compiler/scene_yaml.h"
 
 namespace fulcrum::supervisor::cli {
@@ -20,14 +22,16 @@ constexpr const char* kUsage =
        fulcrum scene explain KEY
        fulcrum scene schema
        fulcrum scene list
+       fulcrum scene materials [SCENE]
 
-new      writes NAME.yaml around a mesh of an organ, with membrane, tools, scope and a script that grasps and
-         cuts, and draws it into NAME.png
-check    reads and builds a scene without writing it, and prints its size and quality
-preview  draws a scene from four sides
-explain  prints a key's default and valid values; every key that contains the text
-schema   prints a JSON Schema of the keys, for an editor that completes and checks YAML
-list     lists the shipped scenes
+new        writes NAME.yaml around a mesh of an organ, with membrane, tools, scope and a script that grasps and
+           cuts, and draws it into NAME.png
+check      reads and builds a scene without writing it, and prints its size and quality
+preview    draws a scene from four sides
+explain    prints a key's default and valid values; every key that contains the text
+schema     prints a JSON Schema of the keys, for an editor that completes and checks YAML
+list       lists the shipped scenes
+materials  lists the materials of bodies and sheets with their source, with those beside SCENE
 
 Examples:
   fulcrum scene new liver --from liver.stl && fulcrum up liver.yaml
@@ -46,7 +50,7 @@ std::string SceneFile(const std::string& name) {
 std::vector<config::KeyRule> AllRules() {
   std::vector<config::KeyRule> all;
   // Keys of lists are known where a scene has them.
-  for (const char* scene : {"openhelp", "built-in", "dissection", "assisted", "gallbladder", "pelvis"}) {
+  for (const char* scene : {"openhelp", "built-in", "dissection", "assisted", "gallbladder", "pelvis", "adhesions"}) {
     for (config::KeyRule& rule :
          scene::SceneRules(runtime::ShareFolder() / "scenes" / (std::string(scene) + ".yaml"))) {
       const auto is_same = [&](const config::KeyRule& other) { return other.path == rule.path; };
@@ -92,6 +96,20 @@ void Explain(const std::string& text) {
   }
 }
 
+void ListMaterials(const std::vector<fs::path>& beside) {
+  const scene::MaterialLibrary library(beside);
+  std::printf("%-12s %10s  %-14s %8s  %s\n", "", "E, kPa", "spread, kPa", "kg/m3", "source");
+  for (const std::string& name : library.Names()) {
+    const std::optional<scene::NamedMaterial> read = library.Find(name);
+    if (!read) continue;
+    std::array<char, 40> spread{}, sheet{};
+    std::snprintf(spread.data(), spread.size(), "%g to %g", 1e-3 * read->least_Pa, 1e-3 * read->most_Pa);
+    if (read->thickness_m > 0) std::snprintf(sheet.data(), sheet.size(), "sheet of %g mm; ", 1e3 * read->thickness_m);
+    std::printf("%-12s %10g  %-14s %8g  %s%s\n", name.c_str(), 1e-3 * read->material.youngs_modulus_Pa, spread.data(),
+                read->material.density_kg_m3, sheet.data(), read->source.c_str());
+  }
+}
+
 }  // namespace
 
 ExitCode Scene(const Words& words) {
@@ -125,10 +143,15 @@ ExitCode Scene(const Words& words) {
   } else if (what == "schema") {
     std::cout << config::JsonSchema(RulesForEditors(), "Fulcrum scene");
     return ExitCode::kDone;
+  } else if (what == "materials") {
+    std::vector<fs::path> beside;
+    if (words.size() > 1) beside.push_back(fs::path(SceneFile(words[1])).parent_path());
+    ListMaterials(beside);
+    return ExitCode::kDone;
   } else if (what == "list") {
     command.emplace_back("--list");
   } else {
-    throw InputError("no 'scene " + what + "'; valid: new, check, preview, explain, schema, list");
+    throw InputError("no 'scene " + what + "'; valid: new, check, preview, explain, schema, list, materials");
   }
   command.insert(command.end(), rest.begin(), rest.end());
   Become(command);

@@ -46,6 +46,25 @@ inline constexpr std::uint32_t kRowsBetweenSheets = 8;
   return of;
 }
 
+/// What a sheet is made of: physics.membrane_Et_N_per_m and so on, where it has none of its own.
+struct SheetProperties {
+  float Et_N_per_m, bending_Nm, fat_youngs_modulus_Pa, tear_stretch;
+};
+[[nodiscard]] inline SheetProperties PropertiesOf(const SheetPart& sheet, const PhysicsParams& physics) {
+  const auto own_or = [](float own, float of_scene) { return own > 0.0f ? own : of_scene; };
+  return {own_or(sheet.Et_N_per_m, physics.membrane_Et_N_per_m), own_or(sheet.bending_Nm, physics.membrane_bending_Nm),
+          own_or(sheet.fat_youngs_modulus_Pa, physics.fat_youngs_modulus_Pa),
+          own_or(sheet.tear_stretch, physics.tear_stretch)};
+}
+
+/// By row of the grid: the properties of its sheet.
+[[nodiscard]] inline std::vector<SheetProperties> PropertiesOfRows(const TissueScene& scene) {
+  const std::vector<SheetPart> sheets = SheetsOf(scene);
+  std::vector<SheetProperties> of;
+  for (const std::size_t sheet : SheetOfRows(scene)) of.push_back(PropertiesOf(sheets[sheet], scene.physics));
+  return of;
+}
+
 /// By sheet: the body that it moves with, by the number of a solid, else with a number of its own after those. Bodies
 /// are at rest or in motion as a whole.
 [[nodiscard]] inline std::vector<Index> BodyOfSheets(const TissueScene& scene) {

@@ -16,6 +16,7 @@
 #include "services/base/core/escape.h"
 #include "services/scene/anatomy/surface_nets.h"
 #include "services/scene/builder/geometry.h"
+#include "services/scene/compiler/materials.h"
 #include "services/scene/compiler/mesh_repair.h"
 #include "services/scene/compiler/new_scene.h"
 #include "services/scene/compiler/preview.h"
@@ -209,6 +210,7 @@ void DescribeBodies(const std::vector<LabelUse>& uses, const std::map<std::strin
 LabelUses ReadLabelUses(const fs::path& file) {
   StrictYaml yaml = StrictYaml::FromFile(file);
   StrictMap root = yaml.root();
+  const MaterialLibrary materials;
   LabelUses result;
   std::set<std::string> names, sources;
   int organs = 0;
@@ -237,8 +239,8 @@ LabelUses ReadLabelUses(const fs::path& file) {
     }
     use.collides = entry.Flag("collides", use.collides);
     use.material = entry.TextOr("material", "", 31);
-    if (!use.material.empty() && FindMaterial(use.material) == nullptr) {
-      entry.Fail("material", "'" + use.material + "' is not one of " + MaterialNames());
+    if (!use.material.empty() && !materials.Find(use.material)) {
+      entry.Fail("material", materials.Unknown(use.material));
     }
     if (!use.material.empty() && use.name == "organ") {
       entry.Fail("name", "'organ' means the one under the membrane; give a deformable body another name");
@@ -306,9 +308,13 @@ std::string SuggestLabelUses(const fs::path& labels) {
   }
   const auto largest =
       std::max_element(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.size < b.size; });
+  std::string names_of_materials;
+  for (const std::string& name : MaterialLibrary().Names()) {
+    names_of_materials += (names_of_materials.empty() ? "" : ", ") + name;
+  }
   std::string text =
       "# What becomes of each: one organ, which gets the membrane; the others are deformable with a `material` (" +
-      MaterialNames() +
+      names_of_materials +
       "), else fixed. What is left out is ignored.\n# role: abdominal_wall, retroperitoneum, pelvis, bladder or other, "
       "which "
       "decides the colour.\n";

@@ -26,10 +26,6 @@ constexpr double kLongestReach_m = 0.30;
 /// turn a shorter lever.
 constexpr double kLeastLever_m = 0.015;
 
-[[noreturn]] void Refuse(const SceneSettings& settings, const std::string& text) {
-  throw InputError("scene '" + settings.name + "': " + text);
-}
-
 void CheckSheet(const SceneSettings& settings, const SheetBody& sheet) {
   const MembraneSettings& m = sheet.grid;
   if (m.rows < 2 || m.cols < 2 || sheet.nodes.size() != static_cast<std::size_t>(m.rows) * m.cols) {
@@ -313,6 +309,10 @@ void AddPlannedLine(const SceneSettings& settings, const std::vector<PlacedSheet
 }
 
 }  // namespace
+
+void Refuse(const SceneSettings& settings, const std::string& text) {
+  throw InputError("scene '" + settings.name + "': " + text);
+}
 
 SceneData AssembleScene(const SceneSettings& settings, const Anatomy& anatomy) {
   SceneData scene;

@@ -29,7 +29,11 @@ struct SheetBody {
   std::vector<Vec3d> nodes;                  ///< Row by row.
   Index over = kNoIndex;                     ///< Number of the solid to which it is bound; none: to all within reach.
   bool ends_held = true, sides_held = true;  ///< First and last row, first and last column.
+  SheetProperties own{};                     ///< 0: that of the scene.
 };
+
+/// Throws InputError with the name of the scene.
+[[noreturn]] void Refuse(const SceneSettings& settings, const std::string& text);
 
 /// The bodies and their surroundings, procedural or imported.
 struct Anatomy {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "services/base/core/scene_view.h"
+#include "services/base/core/sheets.h"
 #include "services/base/core/solids.h"
-#include "services/scene/builder/materials.h"
 #include "services/scene/builder/operator_hand.h"
 
 namespace fulcrum::scene {
@@ -91,6 +91,13 @@ struct ImportSettings {
   std::vector<Surrounding> surroundings;
 };
 
+/// What a body is made of.
+struct Material {
+  SolidLook look = SolidLook::kBowel;
+  double youngs_modulus_Pa = 1e5;
+  double density_kg_m3 = 1050;
+};
+
 /// A further deformable body, in the frame in which the organ is described: that of the files of `import`, else W.
 struct BodySettings {
   std::string name;
@@ -137,6 +144,7 @@ struct SheetSettings {
   double width_m = 0, length_m = 0;             ///< Of the patch; 0: most of the body as seen from outside.
   std::array<std::vector<Vec3f>, 2> between_m;  ///< Points of the lines of the first and the last row.
   bool ends_held = true, sides_held = true;     ///< The first and the last row, the first and the last column.
+  SheetProperties own{};                        ///< 0: that of the scene.
 };
 
 /// A ureter or nerve below the membrane, through points given as fractions of the sheet.

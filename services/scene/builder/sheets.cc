@@ -20,10 +20,6 @@ constexpr double kApart_m = 0.004;        ///< Between two sheets in the atlas: 
 constexpr double kTexel_m = static_cast<double>(MembraneGrid().texel_m);
 constexpr double kPatch_m = kPatchTexels * kTexel_m;
 
-[[noreturn]] void Refuse(const SceneSettings& settings, const std::string& text) {
-  throw InputError("scene '" + settings.name + "': " + text);
-}
-
 std::size_t NodeOf(const SheetBody& sheet, int row, int col) {
   return static_cast<std::size_t>(row) * static_cast<std::size_t>(sheet.grid.cols) + static_cast<std::size_t>(col);
 }
@@ -108,6 +104,10 @@ std::vector<SheetPart> PlaceSheets(const std::vector<SheetBody>& sheets) {
     part.rows = static_cast<std::uint32_t>(sheet.grid.rows);
     part.cols = static_cast<std::uint32_t>(sheet.grid.cols);
     part.over = sheet.over;
+    part.Et_N_per_m = sheet.own.Et_N_per_m;
+    part.bending_Nm = sheet.own.bending_Nm;
+    part.fat_youngs_modulus_Pa = sheet.own.fat_youngs_modulus_Pa;
+    part.tear_stretch = sheet.own.tear_stretch;
     const std::uint32_t least = row + part.rows + kRowsBetweenSheets;
     row = (least + kRowsBetweenSheets - 1) / kRowsBetweenSheets * kRowsBetweenSheets;
   }

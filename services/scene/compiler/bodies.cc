@@ -122,6 +122,7 @@ void AddSheets(const SceneSettings& settings, const Placement& placement, const 
     sheet.grid = wanted.grid;
     sheet.ends_held = wanted.ends_held;
     sheet.sides_held = wanted.sides_held;
+    sheet.own = wanted.own;
     Named("sheet", wanted.name, [&] {
       if (wanted.over.empty()) {
         Span(wanted, placement, origin, &sheet);

@@ -347,7 +347,7 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesys
   const auto find = [&](const StrictMap& map, const std::string& key) {
     return FindFile(map, key, StrictMap(map).Text(key), folders);
   };
-  ReadBodies(&root, find, &scene);
+  ReadBodies(&root, find, MaterialLibrary(bases), &scene);
   if (scene.has_organ) ReadMembrane(root.MapOrDefaults("membrane"), &scene.membrane);
   const bool has_sheets = scene.has_organ || !scene.sheets.empty();
   for (StrictMap& entry : root.Maps("structures", 0, kMaxStructures)) {

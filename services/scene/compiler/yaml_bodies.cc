@@ -1,6 +1,9 @@
 #include "services/scene/compiler/yaml_bodies.h"
 
+#include <algorithm>
 #include <array>
+#include <initializer_list>
+#include <optional>
 #include <set>
 
 #include "services/base/core/sheets.h"
@@ -34,23 +37,29 @@ void ReadSwept(StrictMap* map, ShapeSettings* shape) {
   if (shape->radius_m.size() != shape->line_m.size()) map->Fail("radius_mm", "must have one entry, or as many as x_mm");
 }
 
-Material ReadMaterial(StrictMap* map) {
+/// The material that a body or sheet names. Its file may be missing where the description replaces all that it says, as
+/// in the effective YAML of a compiled scene.
+NamedMaterial ReadNamed(StrictMap* map, const MaterialLibrary& materials, std::initializer_list<const char*> replaced) {
   const std::string name = map->Text("material", 31);
-  const NamedMaterial* named = FindMaterial(name);
-  if (named == nullptr) {
-    map->Fail("material", "'" + name + "' is not one of " + MaterialNames());
+  const std::optional<NamedMaterial> named = materials.Find(name);
+  if (!named && !std::ranges::all_of(replaced, [map](const char* key) { return map->Has(key); })) {
+    map->Fail("material", materials.Unknown(name));
   }
-  Material material = named->material;
+  return named.value_or(NamedMaterial{});
+}
+
+Material ReadMaterial(StrictMap* map, const MaterialLibrary& materials) {
+  Material material = ReadNamed(map, materials, {"look", "youngs_modulus_kPa", "density_kg_m3"}).material;
   material.look = map->Choice("look", material.look, kSolidLookNames);
   ReadSi(map, "youngs_modulus_kPa", Range::Between(0.01, 1e4), &material.youngs_modulus_Pa);
   ReadSi(map, "density_kg_m3", Range::Between(100, 2e4), &material.density_kg_m3);
   return material;
 }
 
-BodySettings ReadBody(StrictMap map, const FindMesh& find) {
+BodySettings ReadBody(StrictMap map, const FindMesh& find, const MaterialLibrary& materials) {
   BodySettings body;
   body.name = map.Text("name", 31);
-  body.material = ReadMaterial(&map);
+  body.material = ReadMaterial(&map, materials);
   const int sources = (map.Has("mesh") ? 1 : 0) + (map.Has("shape") ? 1 : 0) + (map.Has("tube") ? 1 : 0);
   if (sources == 0) map.Fail("name", "needs one of `mesh`, `shape` and `tube`");
   if (sources > 1)
@@ -90,7 +99,37 @@ int Stride(int cells, int most) {
   return most;
 }
 
-SheetSettings ReadSheet(StrictMap map) {
+/// Flexural rigidity of an incompressible plate: E t^3 / (12 (1 - 1/4)).
+double BendingOf(double youngs_modulus_Pa, double thickness_m) {
+  return youngs_modulus_Pa * thickness_m * thickness_m * thickness_m / 9;
+}
+
+/// What a sheet is made of, if it does not leave that to the section `physics`.
+void ReadSheetMaterial(StrictMap* map, const MaterialLibrary& materials, SheetSettings* sheet) {
+  double tear_stretch = 0;
+  if (map->Has("material")) {
+    NamedMaterial named = ReadNamed(map, materials, {"youngs_modulus_kPa", "thickness_mm"});
+    double& modulus_Pa = named.material.youngs_modulus_Pa;
+    ReadSi(map, "youngs_modulus_kPa", Range::Between(0.01, 1e4), &modulus_Pa);
+    if (named.thickness_m == 0 && !map->Has("thickness_mm")) {
+      map->Fail("material", "has no thickness: give the sheet's `thickness_mm`");
+    }
+    ReadSi(map, "thickness_mm", Range::Between(0.01, 5), &named.thickness_m);
+    sheet->own.Et_N_per_m = static_cast<float>(modulus_Pa * named.thickness_m);
+    sheet->own.bending_Nm = static_cast<float>(BendingOf(modulus_Pa, named.thickness_m));
+    sheet->grid.density_kg_m2 = named.material.density_kg_m3 * named.thickness_m;
+    tear_stretch = named.tear_stretch;
+  }
+  ReadSi(map, "density_kg_m2", Range::Between(0.01, 50), &sheet->grid.density_kg_m2);
+  sheet->own.fat_youngs_modulus_Pa =
+      static_cast<float>(map->NumberSi("fat_youngs_modulus_kPa", 0, Range::Between(0, 1e6)));
+  sheet->own.tear_stretch = static_cast<float>(map->Number("tear_stretch", tear_stretch, Range::Between(0, 10)));
+  if (sheet->own.tear_stretch != 0.0f && !(sheet->own.tear_stretch > 1.0f)) {
+    map->Fail("tear_stretch", "must be above 1, or 0 (that of `physics`)");
+  }
+}
+
+SheetSettings ReadSheet(StrictMap map, const MaterialLibrary& materials) {
   SheetSettings sheet;
   sheet.name = map.Text("name", 31);
   if (map.Has("over") == map.Has("between")) {
@@ -126,7 +165,7 @@ SheetSettings ReadSheet(StrictMap map) {
   }
   ReadInteger(&map, "rows", 2, 5000, &grid.rows);
   ReadInteger(&map, "cols", 2, 5000, &grid.cols);
-  ReadSi(&map, "density_kg_m2", Range::Between(0.01, 50), &grid.density_kg_m2);
+  ReadSheetMaterial(&map, materials, &sheet);
   ReadInteger(&map, "binding_row_stride", 1, 1000, &grid.binding_row_stride);
   ReadInteger(&map, "binding_col_stride", 1, 1000, &grid.binding_col_stride);
   grid.binding_reach_m = grid.gap_m + kBindingReach_m;
@@ -140,13 +179,6 @@ SheetSettings ReadSheet(StrictMap map) {
 }
 
 }  // namespace
-
-const StrictMap::Choices<SolidLook> kSolidLookNames = {
-    {"bowel", SolidLook::kBowel},   {"bladder", SolidLook::kBladder},
-    {"liver", SolidLook::kLiver},   {"gallbladder", SolidLook::kGallbladder},
-    {"fat", SolidLook::kFat},       {"muscle", SolidLook::kMuscle},
-    {"artery", SolidLook::kArtery}, {"vein", SolidLook::kVein},
-    {"ureter", SolidLook::kUreter}, {"nerve", SolidLook::kNerve}};
 
 std::vector<Vec3f> ReadLine(StrictMap* map) {
   std::array<std::vector<double>, 3> axes;
@@ -175,17 +207,17 @@ ShapeSettings ReadShape(StrictMap map) {
   return shape;
 }
 
-void ReadBodies(StrictMap* root, const FindMesh& find, SceneSettings* scene) {
+void ReadBodies(StrictMap* root, const FindMesh& find, const MaterialLibrary& materials, SceneSettings* scene) {
   std::set<std::string> names;
   if (scene->has_organ) names.insert("organ");
   for (StrictMap& entry : root->Maps("bodies", 0, kMostBodies)) {
-    scene->bodies.push_back(ReadBody(entry, find));
+    scene->bodies.push_back(ReadBody(entry, find, materials));
     if (!names.insert(scene->bodies.back().name).second) entry.Fail("name", "is there twice");
   }
   const std::set<std::string> bodies = names;
   const std::string organ = scene->has_organ ? ", nor `organ`" : "";
   for (StrictMap& entry : root->Maps("sheets", 0, kMaxSheets - 1)) {
-    const SheetSettings& sheet = scene->sheets.emplace_back(ReadSheet(entry));
+    const SheetSettings& sheet = scene->sheets.emplace_back(ReadSheet(entry, materials));
     if (!sheet.over.empty() && !bodies.contains(sheet.over)) {
       entry.Fail("over", "'" + sheet.over + "' is no body of this scene");
     }

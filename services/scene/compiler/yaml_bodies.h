@@ -8,11 +8,9 @@
 
 #include "services/base/config/strict_yaml.h"
 #include "services/scene/builder/scene_settings.h"
+#include "services/scene/compiler/materials.h"
 
 namespace fulcrum::scene {
-
-/// Choices of the key `look`.
-extern const config::StrictMap::Choices<SolidLook> kSolidLookNames;
 
 /// Points of a line from `x_mm`, `y_mm` and `z_mm`, at least two and at most 64 [m].
 std::vector<Vec3f> ReadLine(config::StrictMap* map);
@@ -24,6 +22,6 @@ ShapeSettings ReadShape(config::StrictMap map);
 using FindMesh = std::function<std::filesystem::path(const config::StrictMap&, const std::string& key)>;
 
 /// `bodies`, `sheets` and `attach` of a description, whose organ is known.
-void ReadBodies(config::StrictMap* root, const FindMesh& find, SceneSettings* scene);
+void ReadBodies(config::StrictMap* root, const FindMesh& find, const MaterialLibrary& materials, SceneSettings* scene);
 
 }  // namespace fulcrum::scene

@@ -11,7 +11,7 @@
 
 namespace fulcrum::scene {
 
-inline constexpr std::uint32_t kSceneFileVersion = 13;
+inline constexpr std::uint32_t kSceneFileVersion = 14;
 /// Version of what the content hash is taken of; another one changes the hash of every scene.
 inline constexpr std::uint32_t kSceneContentVersion = 11;
 

@@ -99,6 +99,14 @@ void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const Scen
   }
 }
 
+/// Every file of a folder of materials that the scene may name.
+void AddMaterials(const fs::path& scenes, Hash64* hash) {
+  std::set<fs::path> files;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(scenes / "materials", error)) files.insert(entry.path());
+  for (const fs::path& file : files) AddFile(hash, file);
+}
+
 fs::path FindYaml(const SceneRequest& request) {
   std::error_code error;  // A name that is too long is no file either.
   if (fs::is_regular_file(request.name, error)) {
@@ -177,6 +185,9 @@ fs::path ResolveScene(const SceneRequest& request) {
   AddFile(&hash, request.compiler);
   std::set<fs::path> seen;
   AddFilesNamedIn(yaml, source.parent_path(), request, &seen, &hash);
+  seen.insert(source);
+  for (const fs::path& file : std::set<fs::path>(seen)) AddMaterials(file.parent_path(), &hash);
+  AddMaterials(request.library.parent_path(), &hash);
   std::array<char, 24> key{};
   std::snprintf(key.data(), key.size(), "-%016llx", static_cast<unsigned long long>(hash.value()));
   fs::path target = request.cache / (source.stem().string() + key.data() + ".fulcrum");

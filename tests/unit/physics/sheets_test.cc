@@ -8,6 +8,7 @@
 
 #include "physics_node/energy/elastic_model.h"
 #include "physics_node/simulation/tissue_simulation.h"
+#include "physics_node/tear/tear_watch.h"
 #include "services/scene/builder/build.h"
 #include "tests/support/several_solids.h"
 #include "tests/support/whole_topology.h"
@@ -272,6 +273,126 @@ TEST_P(Strip, SagsAsAString) {
   for (const std::uint32_t c : {0u, strip.cols / 2, strip.cols - 1}) {
     const Index node = (strip.first_row + 20) * scene.membrane.cols + c;
     EXPECT_NEAR(static_cast<double>(At(simulation, node).z()) / expected, 1, 0.015) << "column " << c;
+  }
+}
+
+/// Second of two equal strips, with properties of its own.
+constexpr SheetProperties kOwn{20, 1e-6f, 9e3f, 1.4f};
+scene::SceneData TwoStrips(const scene::SceneSettings& settings, bool with_pad) {
+  scene::Anatomy anatomy;
+  if (with_pad) {
+    anatomy.solids.push_back(Box("pad", {-0.02, -0.02, 0}, {0.2, 0.12, 0.015}, {8, 8, 3}, 2e4));
+    Fix(&anatomy.solids[0], [](const Vec3d& p) { return p.z() < 1e-6; });
+  }
+  anatomy.sheets.push_back(Flat("first", 41, 6, 0.002, Vec3d(0, 0, 0.018)));
+  anatomy.sheets.push_back(Flat("second", 41, 6, 0.002, Vec3d(0.1, 0, 0.018)));
+  for (scene::SheetBody& sheet : anatomy.sheets) {
+    sheet.sides_held = false;
+    sheet.grid.density_kg_m2 = 0.5;
+    if (with_pad) sheet.over = 0;
+  }
+  anatomy.sheets[1].own = kOwn;
+  return scene::AssembleScene(settings, anatomy);
+}
+
+TEST(SheetsOfTheirOwn, HaveTheStiffnessThatASceneOfThatAloneWouldHave) {
+  scene::SceneSettings settings = SettingsOf(PhysicsMode::kAccurate), as_second = settings;
+  as_second.physics.membrane_Et_N_per_m = kOwn.Et_N_per_m;
+  as_second.physics.membrane_bending_Nm = kOwn.bending_Nm;
+  as_second.physics.fat_youngs_modulus_Pa = kOwn.fat_youngs_modulus_Pa;
+  const scene::SceneData data = TwoStrips(settings, true), other = TwoStrips(as_second, true);
+  const SceneView scene = data.View();
+  const ElasticModel model = BuildElasticModel(scene), second = BuildElasticModel(other.View());
+  const auto is_second = [&](Index node) { return node / scene.membrane.cols >= scene.sheets[1].first_row; };
+  int differ = 0;
+  for (std::size_t i = 0; i < model.springs.size(); ++i) {
+    const bool same = model.springs[i].axial == second.springs[i].axial;
+    EXPECT_TRUE(same || !is_second(static_cast<Index>(i / 3))) << "spring " << i;
+    differ += same ? 0 : 1;
+  }
+  for (std::size_t i = 0; i < model.triangles.size(); ++i) {
+    const bool same = model.triangles[i].rest.stiffness == second.triangles[i].rest.stiffness;
+    EXPECT_EQ(same, is_second(static_cast<Index>(model.triangles[i].edges[2] / 3))) << "triangle " << i;
+  }
+  for (std::size_t i = 0; i < model.hinges.size(); ++i) {
+    const bool same = model.hinges[i].stiffness == second.hinges[i].stiffness;
+    EXPECT_EQ(same, is_second(model.hinges[i].v[0] - scene.membrane.first)) << "hinge " << i;
+  }
+  ASSERT_FALSE(model.bindings.empty());
+  for (std::size_t i = 0; i < model.bindings.size(); ++i) {
+    const bool same = model.bindings[i].stiffness == second.bindings[i].stiffness;
+    EXPECT_EQ(same, is_second(model.bindings[i].membrane - scene.membrane.first)) << "binding " << i;
+  }
+  EXPECT_GT(differ, 0);
+}
+
+/// As Strip, and with all edges shortened by heat: then w = q L^2 / (8 T), T = E t (1/s - 1 + 8/3 (w/L)^2) for edges of
+/// the share s.
+TEST(SheetsOfTheirOwn, SagAsStringsOfTheirOwnStiffness) {
+  constexpr double kG = 3.2, kWeight_Pa = 0.5 * kG, kLength_m = 40 * 0.002, kShare = 0.99;
+  scene::SceneSettings settings = SettingsOf(PhysicsMode::kAccurate);
+  settings.physics.gravity = Vec3f(0, 0, -static_cast<float>(kG));
+  settings.physics.membrane_stiffening = settings.physics.membrane_prestrain = 0;
+  settings.physics.membrane_bending_Nm = 1e-9f;
+  settings.physics.damping_per_s = 4;
+  const scene::SceneData data = TwoStrips(settings, false);
+  const SceneView scene = data.View();
+  TissueSimulation simulation(scene);
+  const auto sag = [&](std::size_t sheet) {
+    const Index node = (scene.sheets[sheet].first_row + 20) * scene.membrane.cols + 3;
+    return 0.018 - static_cast<double>(At(simulation, node).z());
+  };
+  for (int i = 0; i < 1500; ++i) simulation.Step({});
+  const double Et[2] = {static_cast<double>(settings.physics.membrane_Et_N_per_m), kOwn.Et_N_per_m};
+  for (const std::size_t sheet : {0u, 1u}) {
+    EXPECT_NEAR(sag(sheet) / std::cbrt(3 * kWeight_Pa * std::pow(kLength_m, 4) / (64 * Et[sheet])), 1, 0.01) << sheet;
+  }
+  // The stiff one has been at rest for a while before; the soft one has come to rest all the same.
+  EXPECT_TRUE(simulation.Step({}).asleep);
+  TopologyState shrunk = WholeTopology(scene);
+  shrunk.revision = 1;
+  std::ranges::fill(shrunk.shrink, std::uint8_t{5});
+  ASSERT_NEAR(1 - 5 * static_cast<double>(kShrinkUnit), kShare, 1e-6);
+  ASSERT_GT(simulation.ApplyTopology(shrunk), 0);
+  for (int i = 0; i < 1500; ++i) simulation.Step({});
+  for (const std::size_t sheet : {0u, 1u}) {
+    double w = 1e-3;
+    for (int i = 0; i < 100; ++i) {
+      const double tension = Et[sheet] * (1 / kShare - 1 + 8.0 / 3 * std::pow(w / kLength_m, 2));
+      w = 0.5 * (w + kWeight_Pa * kLength_m * kLength_m / (8 * tension));
+    }
+    EXPECT_NEAR(sag(sheet) / w, 1, 0.03) << sheet;
+  }
+}
+
+TEST(SheetsOfTheirOwn, TearAtTheirOwnStretch) {
+  for (const float of_scene : {3.1f, 0.0f}) {
+    scene::SceneSettings settings = SettingsOf(PhysicsMode::kAccurate);
+    settings.physics.tear_stretch = of_scene;
+    settings.physics.membrane_prestrain = 0;
+    const scene::SceneData data = TwoStrips(settings, false);
+    const SceneView scene = data.View();
+    ParticleStore particles(scene);
+    TissueModel model(scene, &particles);
+    TearWatch tears(scene, &model, &particles);
+    const auto pull = [&](float stretch) {
+      for (Index node = 0; node < scene.membrane.node_count(); ++node) {
+        Vec3f p = scene.rest_position[scene.membrane.first + node];
+        p.y() *= stretch;
+        particles.Set(particles.Ref(scene.membrane.first + node), p);
+      }
+      tears.RowsMoved(0, scene.membrane.rows, 0.1f);
+      return tears.Evaluate(10);
+    };
+    EXPECT_FALSE(pull(1.35f));
+    EXPECT_NEAR(tears.largest_stretch(), 1.35f, 1e-3f);
+    EXPECT_EQ(tears.limit(), kOwn.tear_stretch);
+    EXPECT_TRUE(pull(1.45f));
+    for (std::size_t edge = 0; edge < 3 * std::size_t{scene.membrane.node_count()}; ++edge) {
+      if (!TestBit(tears.torn(), edge)) continue;
+      EXPECT_GE(edge / 3 / scene.membrane.cols, scene.sheets[1].first_row) << "edge " << edge;
+    }
+    EXPECT_GE(tears.torn_count(), 6u);
   }
 }
 

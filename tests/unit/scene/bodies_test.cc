@@ -158,16 +158,6 @@ TEST(Bodies, ASweptShapeIsClosedAndRound) {
   EXPECT_NEAR(EnclosedVolume(SurfaceOfShape(shape)), ellipsoid, 0.02 * ellipsoid);
 }
 
-TEST(Bodies, MaterialsNameTheirSource) {
-  for (const NamedMaterial& m : Materials()) {
-    EXPECT_EQ(FindMaterial(m.name), &m);
-    EXPECT_LE(m.least_Pa, m.material.youngs_modulus_Pa);
-    EXPECT_GE(m.most_Pa, m.material.youngs_modulus_Pa);
-    EXPECT_GT(m.source.size(), 10u);
-  }
-  EXPECT_EQ(FindMaterial("cheese"), nullptr);
-}
-
 struct Refused {
   const char *lines, *reason;
 };

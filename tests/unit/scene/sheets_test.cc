@@ -158,6 +158,10 @@ TEST_F(ThreeSheets, AreRefusedWhereTheyDoNotFitTheGrid) {
   EXPECT_EQ(fault([](SceneData* d) { d->sheets[2].name[31] = 'x', std::memset(d->sheets[2].name, 'x', 32); }),
             "sheets");
   EXPECT_EQ(fault([](SceneData* d) { d->sheets.resize(2); }), "sheets");
+  EXPECT_EQ(fault([](SceneData* d) { d->sheets[1].Et_N_per_m = -1; }), "sheets");
+  EXPECT_EQ(fault([](SceneData* d) { d->sheets[1].bending_Nm = std::nanf(""); }), "sheets");
+  EXPECT_EQ(fault([](SceneData* d) { d->sheets[1].fat_youngs_modulus_Pa = 2e9f; }), "sheets");
+  EXPECT_EQ(fault([](SceneData* d) { d->sheets[1].tear_stretch = 0.9f; }), "sheets");
   EXPECT_EQ(fault([](SceneData* d) { d->fixed.membrane.rows += 1; }), "rest_position");
   EXPECT_EQ(fault([](SceneData* d) { d->sheets[2].rows -= 1; }), "sheets") << "the last row of the grid is no sheet's";
   EXPECT_EQ(fault([](SceneData* d) { d->sheets.erase(d->sheets.begin()); }), "sheets") << "nor is the first";

@@ -1,0 +1,41 @@
+// Materials by name: one YAML file each, with the spread and the source of its stiffness (services/scene/README.md).
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "services/base/config/strict_yaml.h"
+#include "services/scene/builder/scene_settings.h"
+
+namespace fulcrum::scene {
+
+extern const config::StrictMap::Choices<SolidLook> kSolidLookNames;
+
+struct NamedMaterial {
+  Material material;
+  double least_Pa = 0, most_Pa = 0;  ///< Spread of the published moduli.
+  double thickness_m = 0;            ///< As a sheet; 0: not given.
+  double tear_stretch = 0;           ///< As a sheet; 0: that of the scene.
+  std::string source;
+};
+
+/// NAME.yaml in the folders `materials` beside files of scenes, then among the shipped ones.
+class MaterialLibrary {
+ public:
+  /// @param beside folders of files of scenes; of two materials of one name the first counts.
+  explicit MaterialLibrary(const std::vector<std::filesystem::path>& beside = {});
+
+  /// nullopt: none of this name. Throws InputError if its file is malformed.
+  [[nodiscard]] std::optional<NamedMaterial> Find(const std::string& name) const;
+  /// Sorted.
+  [[nodiscard]] std::vector<std::string> Names() const;
+  /// For refusals: "'NAME' is not one of ...".
+  [[nodiscard]] std::string Unknown(const std::string& name) const;
+
+ private:
+  std::vector<std::filesystem::path> folders_;
+};
+
+}  // namespace fulcrum::scene

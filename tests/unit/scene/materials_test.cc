@@ -1,0 +1,138 @@
+// Materials by name: the shipped ones, those beside a scene, and what bodies and sheets take from them.
+#include "services/scene/compiler/materials.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "services/base/core/error.h"
+#include "services/scene/compiler/compile.h"
+#include "services/scene/compiler/scene_yaml.h"
+
+namespace fulcrum::scene {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kGel =
+    "look: fat\nyoungs_modulus_kPa: 40\nspread_kPa: [30, 60]\ndensity_kg_m3: 1000\n"
+    "thickness_mm: 0.5\ntear_stretch: 2\nsource: measured in the lab\n";
+
+class MaterialsTest : public testing::Test {
+ protected:
+  MaterialsTest() { fs::create_directories(folder_ / "materials"); }
+  ~MaterialsTest() override { fs::remove_all(folder_); }
+  void Write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / "materials" / name) << text;
+  }
+  /// A scene with a pad and a band.
+  [[nodiscard]] fs::path Scene(const std::string& of_pad, const std::string& of_band) const {
+    const fs::path file = folder_ / "scene.yaml";
+    std::ofstream(file)
+        << "name: materials\nphysics: {mode: accurate}\n"
+           "bodies: [{name: pad, shape: {ellipsoid_mm: [30, 25, 10], at_mm: [0, 0, 80]}, tet_edge_mm: 7, "
+        << of_pad << ", held_side: [0, 0, -1]}]\n"
+        << "sheets: [{name: band, between: {first: {x_mm: [-2, 2], y_mm: [-20, -20], z_mm: [60, 60]},\n"
+           "  last: {x_mm: [-2, 2], y_mm: [20, 20], z_mm: [60, 60]}}, rows: 21, cols: 2"
+        << of_band << "}]\n";
+    return file;
+  }
+  [[nodiscard]] SceneDescription Read(const std::string& of_pad, const std::string& of_band) const {
+    return ReadSceneYaml(Scene(of_pad, of_band), {});
+  }
+  [[nodiscard]] std::string RefusalOf(const std::string& of_pad, const std::string& of_band) const {
+    try {
+      (void)Read(of_pad, of_band);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  fs::path folder_ = fs::temp_directory_path() / ("scene_materials_test." + std::to_string(::getpid()));
+};
+
+TEST_F(MaterialsTest, ShippedOnesNameTheirSource) {
+  const MaterialLibrary library;
+  const std::vector<std::string> names = library.Names();
+  EXPECT_GE(names.size(), 10u);
+  EXPECT_TRUE(std::ranges::is_sorted(names));
+  for (const std::string& name : names) {
+    SCOPED_TRACE(name);
+    const std::optional<NamedMaterial> read = library.Find(name);
+    ASSERT_TRUE(read);
+    EXPECT_LE(read->least_Pa, read->material.youngs_modulus_Pa);
+    EXPECT_GE(read->most_Pa, read->material.youngs_modulus_Pa);
+    EXPECT_GT(read->source.size(), 10u);
+  }
+  EXPECT_EQ(library.Find("liver")->material.look, SolidLook::kLiver);
+  EXPECT_FALSE(library.Find("cheese"));
+}
+
+TEST_F(MaterialsTest, ThoseBesideTheSceneComeFirst) {
+  Write("gel.yaml", kGel);
+  Write("liver.yaml", kGel);
+  const SceneDescription read = Read("material: liver", ", material: gel");
+  EXPECT_EQ(read.settings.bodies[0].material.youngs_modulus_Pa, 40e3);
+  EXPECT_EQ(read.settings.bodies[0].material.look, SolidLook::kFat);
+  EXPECT_EQ(MaterialLibrary().Find("liver")->material.youngs_modulus_Pa, 5.4e3);
+}
+
+TEST_F(MaterialsTest, ASheetTakesItsProperties) {
+  Write("gel.yaml", kGel);
+  const SceneData plain = CompileScene(Scene("material: liver", ", held: ends"), {}, {}).data;
+  EXPECT_EQ(plain.sheets[0].Et_N_per_m, 0);
+  EXPECT_EQ(plain.sheets[0].tear_stretch, 0);
+  const SceneDescription read = Read("material: liver", ", material: gel, fat_youngs_modulus_kPa: 7, held: ends");
+  const SceneData data = BuildScene(read.settings, {});
+  EXPECT_FLOAT_EQ(data.sheets[0].Et_N_per_m, 20);
+  EXPECT_FLOAT_EQ(data.sheets[0].bending_Nm, 40e3f * 0.5e-3f * 0.5e-3f * 0.5e-3f / 9);
+  EXPECT_FLOAT_EQ(data.sheets[0].fat_youngs_modulus_Pa, 7000);
+  EXPECT_FLOAT_EQ(data.sheets[0].tear_stretch, 2);
+  const Index inner = data.fixed.membrane.first + 20;
+  ASSERT_GT(plain.inverse_mass[inner], 0);
+  EXPECT_NEAR(data.inverse_mass[inner] / plain.inverse_mass[inner], 0.5 / (1000 * 0.5e-3), 1e-4);
+
+  const SceneData other = BuildScene(
+      Read("material: liver", ", material: gel, thickness_mm: 0.2, youngs_modulus_kPa: 100, tear_stretch: 3").settings,
+      {});
+  EXPECT_FLOAT_EQ(other.sheets[0].Et_N_per_m, 20);
+  EXPECT_FLOAT_EQ(other.sheets[0].bending_Nm, 100e3f * 0.2e-3f * 0.2e-3f * 0.2e-3f / 9);
+  EXPECT_FLOAT_EQ(other.sheets[0].tear_stretch, 3);
+}
+
+// A recording's scene is read again elsewhere (replayer --set), where the files beside it are not.
+TEST_F(MaterialsTest, TheEffectiveDescriptionNeedsNoFileOfTheirs) {
+  Write("gel.yaml", kGel);
+  const SceneDescription read = Read("material: gel", ", material: gel");
+  const SceneDescription again = ParseSceneYaml(read.effective_yaml, "again.yaml", {});
+  EXPECT_EQ(BuildScene(again.settings, {}).fixed.hash, BuildScene(read.settings, {}).fixed.hash);
+  EXPECT_EQ(again.settings.bodies[0].material.youngs_modulus_Pa, 40e3);
+  EXPECT_EQ(again.settings.sheets[0].own.Et_N_per_m, read.settings.sheets[0].own.Et_N_per_m);
+}
+
+TEST_F(MaterialsTest, BadOnesAreRefused) {
+  const auto expect = [&](const std::string& text, const char* what) {
+    EXPECT_NE(text.find(what), std::string::npos) << text;
+  };
+  expect(RefusalOf("material: cheese", ""),
+         "scene.yaml:3: bodies[0].material: 'cheese' is not one of artery, bile_duct,");
+  expect(RefusalOf("material: cheese", ""), "nor materials/cheese.yaml beside the scene");
+  // A name is no path.
+  std::ofstream(folder_ / "outside.yaml") << kGel;
+  expect(RefusalOf("material: ../outside", ""), "'../outside' is not one of");
+  expect(RefusalOf("material: liver", ", material: liver"), "material: has no thickness");
+  expect(RefusalOf("material: liver", ", tear_stretch: 0.5"), "tear_stretch: must be above 1");
+  expect(RefusalOf("material: liver", ", thickness_mm: 1"), "thickness_mm");
+  Write("gel.yaml", std::string(kGel) + "viscosity: 3\n");
+  expect(RefusalOf("material: gel", ""), "gel.yaml:8: viscosity");
+  Write("gel.yaml", "look: fat\nyoungs_modulus_kPa: 40\nspread_kPa: [50, 60]\ndensity_kg_m3: 1000\nsource: no\n");
+  expect(RefusalOf("material: gel", ""), "gel.yaml:3: spread_kPa: must contain youngs_modulus_kPa");
+}
+
+}  // namespace
+}  // namespace fulcrum::scene
