@@ -402,6 +402,10 @@ void PhysicsNode::PublishTears(const Tick& tick) {
 
 void PhysicsNode::FillHealth(Health* health) const {
   const auto add = [health](const std::string& name, double value) { health->metrics.push_back({name, value}); };
+  // One warning must not hide another.
+  const auto warn = [health](const std::string& text) {
+    health->last_error += (health->last_error.empty() ? "" : "; ") + text;
+  };
   add("displacement_mm", figures_.displacement_mm.load(std::memory_order_relaxed));
   add("max_displacement_mm", figures_.max_displacement_mm.load(std::memory_order_relaxed));
   add("grasped_particles", figures_.grasped.load(std::memory_order_relaxed));
@@ -417,8 +421,8 @@ void PhysicsNode::FillHealth(Health* health) const {
   add("largest_stretch", figures_.largest_stretch.load(std::memory_order_relaxed));
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
     if ((figures_.limited.load(std::memory_order_relaxed) >> i & 1u) != 0) {
-      health->last_error = "force on tool " + std::to_string(i) + " limited to " +
-                           std::to_string(static_cast<int>(ContactProbe::kForceCap_N)) + " N";
+      warn("force on tool " + std::to_string(i) + " limited to " +
+           std::to_string(static_cast<int>(ContactProbe::kForceCap_N)) + " N");
     }
   }
   const float limit = figures_.tear_stretch.load(std::memory_order_relaxed),
@@ -427,22 +431,22 @@ void PhysicsNode::FillHealth(Health* health) const {
     char text[64];
     std::snprintf(text, sizeof(text), "membrane near tearing: stretch %.2f of %.2f", static_cast<double>(stretch),
                   static_cast<double>(limit));
-    health->last_error = text;
+    warn(text);
   }
   if (const std::uint32_t cheaper = figures_.cheaper.load(std::memory_order_relaxed); cheaper > 0) {
     add("cheaper_presets", cheaper);
-    health->last_error = "steps ran late: a cheaper preset for the next seconds";
+    warn("steps ran late: a cheaper preset for the next seconds");
   }
   if (const std::uint64_t lost = figures_.lost_periods.load(std::memory_order_relaxed); lost > 0) {
     add("time_lost_s", static_cast<double>(lost) * static_cast<double>(scene_.physics.dt_s));
   }
   if (const float pace = figures_.pace.load(std::memory_order_relaxed); static_cast<double>(pace) < Pace::kSlow) {
-    health->last_error = "steps take longer than " + std::to_string(TissueSimulation::kMostStepPeriods) +
-                         " periods: the tissue moves at " + std::to_string(std::lround(100 * pace)) + " % of real time";
+    warn("steps take longer than " + std::to_string(TissueSimulation::kMostStepPeriods) +
+         " periods: the tissue moves at " + std::to_string(std::lround(100 * pace)) + " % of real time");
   }
   if (const std::uint64_t refused = figures_.topology_refused.load(std::memory_order_relaxed); refused > 0) {
     add("topology_refused", static_cast<double>(refused));
-    health->last_error = "TopologyState or OpenCells of another scene refused";
+    warn("TopologyState or OpenCells of another scene refused");
   }
 }
 

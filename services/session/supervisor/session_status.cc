@@ -20,8 +20,11 @@ std::string FiguresLine(const std::string& phase, const SessionRecord& record, d
   line += phase.empty() ? "" : " · " + phase;
   double force_N = 0;
   for (int i = 0; i < kMaxTools; ++i) force_N = std::max(force_N, record.last("force" + std::to_string(i) + "_N"));
-  line += " · force " + Fixed(force_N, 2) + " N · displaced " + Fixed(last("displacement_mm"), 1) + " mm · " +
-          Fixed(last("temperature_C"), 0) + " °C · cut " + Fixed(last("cut_length_mm"), 1) + " mm";
+  line += " · force " + Fixed(force_N, 2) + " N · displaced " + Fixed(last("displacement_mm"), 1) + " mm";
+  // 0: thermal_node has not reported, as in a scene without a sheet.
+  if (const double celsius = last("temperature_C"); celsius > 0) {
+    line += " · " + Fixed(celsius, 0) + " °C · cut " + Fixed(last("cut_length_mm"), 1) + " mm";
+  }
   return line;
 }
 
