@@ -40,6 +40,7 @@ float StepOf(int fine, int count) {
 }
 std::vector<int> NodesAt(int first, int fine, int count) {
   std::vector<int> at;
+  at.reserve(static_cast<std::size_t>(std::max(count, 0)));
   for (int i = 0; i < count; ++i) at.push_back(first + i * (fine - 1) / std::max(count - 1, 1));
   return at;
 }

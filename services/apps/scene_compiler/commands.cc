@@ -124,7 +124,8 @@ std::optional<Vec3d> PointOf(const std::string& option, const std::string& text)
   for (int k = 0; k < 3; ++k) {
     const auto [next, error] = std::from_chars(at, end, point[k]);
     if (error != std::errc() || (k < 2 ? next == end || *next != ',' : next != end)) {
-      throw InputError(option + " '" + text + "'; valid: three numbers as in 10,-2.5,40");
+      throw InputError(
+          std::string(option).append(" '").append(text).append("'; valid: three numbers as in 10,-2.5,40"));
     }
     at = next + 1;
   }

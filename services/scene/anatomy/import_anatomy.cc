@@ -325,6 +325,7 @@ std::string SuggestLabelUses(const fs::path& labels) {
   text += "labels:\n";
   // The larger ones, as many as a scene has room for; the others as comments.
   std::vector<double> sizes;
+  sizes.reserve(entries.size());
   for (const Entry& entry : entries) sizes.push_back(entry.size);
   std::sort(sizes.rbegin(), sizes.rend());
   const double least = sizes[std::min<std::size_t>(sizes.size(), kMostLabels) - 1];

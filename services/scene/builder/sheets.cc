@@ -73,7 +73,7 @@ class Shelves {
       y_ += height_;
       height_ = 0;
     }
-    const Eigen::Vector2d at(x_, y_);
+    Eigen::Vector2d at(x_, y_);
     x_ += patches(size.x());
     height_ = std::max(height_, patches(size.y()));
     return at;
@@ -139,6 +139,7 @@ PlacedSheet::Point PlacedSheet::At(double s, double t) const {
 
 void AddSheetParticles(const std::vector<SheetBody>& sheets, const std::vector<SheetPart>& parts, SceneData* scene) {
   std::vector<std::vector<double>> mass;
+  mass.reserve(sheets.size());
   for (const SheetBody& sheet : sheets) mass.push_back(MassesOf(sheet));
   ForEachNode(parts, scene->fixed.membrane, [&](std::size_t, std::size_t i, int row, int col, bool is_own) {
     const std::size_t node = NodeOf(sheets[i], row, col);

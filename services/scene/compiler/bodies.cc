@@ -23,6 +23,7 @@ std::vector<bool> HeldOn(const std::vector<Vec3d>& vertices, const Vec3d& side, 
     high = i == 0 ? at : std::max(high, at);
   }
   std::vector<bool> held;
+  held.reserve(vertices.size());
   for (const Vec3d& p : vertices) held.push_back(side.dot(p) > high - share * (high - low));
   return held;
 }

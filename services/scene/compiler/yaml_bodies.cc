@@ -229,7 +229,8 @@ void ReadBodies(StrictMap* root, const FindMesh& find, const MaterialLibrary& ma
     attach.from = entry.Text("from", 31);
     attach.to = entry.Text("to", 31);
     for (const auto& [key, name] : {std::pair{"from", attach.from}, std::pair{"to", attach.to}}) {
-      if (!bodies.contains(name)) entry.Fail(key, "'" + name + "' is no body of this scene" + organ);
+      if (bodies.contains(name)) continue;
+      entry.Fail(key, std::string("'").append(name).append("' is no body of this scene").append(organ));
     }
     if (attach.from == attach.to) entry.Fail("to", "must be another body");
     ReadSi(&entry, "reach_mm", Range::Between(0.1, 50), &attach.reach_m);
