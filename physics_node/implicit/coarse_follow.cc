@@ -114,6 +114,13 @@ void CoarseSpace::UpdateRegions(const Regions& regions) {
   std::fill_n(scratch_.value.data(), scratch_.value.size(), 0.0f);
 }
 
+void CoarseSpace::ExcludeSolids(std::span<const Index> folded) {
+  grid_.folded.clear();
+  for (const Index solid : folded) {
+    grid_.folded.insert(grid_.folded.end(), grid_.lattice[solid].begin(), grid_.lattice[solid].end());
+  }
+}
+
 void CoarseSpace::ClearContacts() {
   if (!contacts_.stiff.empty()) {
     std::fill(contacts_.coarse_weight.begin(), contacts_.coarse_weight.end(), 1.0f);

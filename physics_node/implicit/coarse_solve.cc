@@ -26,7 +26,7 @@ void CoarseSpace::Solve(std::span<const Task> tasks, const float* row_sums, cons
     }
     std::fill_n(scratch_.tube_nodes4.data(), scratch_.tube_nodes4.size(), 0.0f);
     for (const Task& task : tasks) {
-      if (!task.sheet && !organ_excluded_) {
+      if (!task.sheet) {
         RestrictTube(task.first, task.end, tube_residual, tube);
       }
     }
@@ -35,10 +35,14 @@ void CoarseSpace::Solve(std::span<const Task> tasks, const float* row_sums, cons
     for (std::size_t i = 0; i < scratch_.nodes4.size(); ++i) {
       scratch_.nodes4[i] += scratch_.tube_nodes4[i];
     }
-    for (const int node : grid_.off) {
-      std::fill_n(scratch_.nodes4.data() + kVertexFloats * static_cast<std::size_t>(node), kVertexFloats, 0.0f);
-    }
+    const auto clear = [this](std::size_t node) {
+      std::fill_n(scratch_.nodes4.data() + kVertexFloats * node, kVertexFloats, 0.0f);
+    };
+    for (const int node : grid_.off) clear(static_cast<std::size_t>(node));
+    for (const std::uint32_t node : grid_.folded) clear(node);
     matrix_.factor.Solve(kernels_, scratch_.nodes4.data(), matrix_.left_out);
+    // Their neighbours in the matrix have moved them.
+    for (const std::uint32_t node : grid_.folded) clear(node);
   }
   workers->Run(kProlongTasks, 0, [&](int task, int) {
     ProlongToHats(hats_.rows * task / kProlongTasks, hats_.rows * (task + 1) / kProlongTasks);
@@ -173,7 +177,7 @@ double CoarseSpace::Prolong(const float* tube, const float* tube_residual, float
   double dot = 0;
   for (auto v = static_cast<std::size_t>(first); v < static_cast<std::size_t>(end); ++v) {
     float* z = tube_z + kVertexFloats * v;
-    if (tube[kVertexFloats * v + 3] > 0.0f && !coarse_off_ && !organ_excluded_) {
+    if (tube[kVertexFloats * v + 3] > 0.0f && !coarse_off_) {
       const LatticePlace& w = grid_.tube_weights[v];
       __m128 sum = _mm_load_ps(z);
       for (std::size_t i = 0; i < kCellCorners; ++i) {

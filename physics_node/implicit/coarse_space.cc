@@ -312,7 +312,12 @@ void CoarseSpace::BuildLattice(const TissueScene& scene, const ElasticModel& mod
     const Index body = body_of_sheet[grid_.sheet_of[row]];
     grid_.body[static_cast<std::size_t>(node)] = static_cast<int>(body);
   }
-  for (const auto& [key, node] : numbers) grid_.body[node] = static_cast<int>(key.first);
+  grid_.lattice.resize(lattices.size());
+  for (const auto& [key, node] : numbers) {
+    grid_.body[node] = static_cast<int>(key.first);
+    grid_.lattice[key.first].push_back(node);
+  }
+  grid_.folded.reserve(numbers.size());
   grid_.off.reserve(grid_.body.size());
   std::vector<Vec3d> place;
   for (int i = 0; i < grid_.rows; ++i) {

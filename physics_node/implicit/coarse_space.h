@@ -59,9 +59,9 @@ class CoarseSpace {
   /// off at the border they would cost far more energy than their blocks contain. They stay in the matrix: in the
   /// preconditioner such a body yields to the others as if it were awake.
   void UpdateRegions(const Regions& regions);
-  /// While the organ is folded the coarse nodes leave it out: their matrix is that of the organ at rest, and in folds
-  /// the organ is a hundred times as stiff.
-  void ExcludeOrgan(bool exclude) { organ_excluded_ = exclude; }
+  /// While a solid is folded its coarse nodes are off: their matrix is that of the solid at rest, and in folds it is a
+  /// hundred times as stiff.
+  void ExcludeSolids(std::span<const Index> folded);
 
   /// Before the contacts of a substep: removes those of the last one.
   void ClearContacts();
@@ -130,8 +130,10 @@ class CoarseSpace {
     std::vector<float> row_step;        ///< By row: the part of a coarse cell between it and the next row.
     std::vector<int> row_at;            ///< By coarse row: its row of the membrane.
     std::vector<LatticePlace> tube_weights;
-    std::vector<int> body;  ///< By node, as Partition::BodyOf.
-    std::vector<int> off;   ///< Nodes that are off.
+    std::vector<int> body;                            ///< By node, as Partition::BodyOf.
+    std::vector<int> off;                             ///< Nodes that are off.
+    std::vector<std::vector<std::uint32_t>> lattice;  ///< By solid: its nodes.
+    std::vector<std::uint32_t> folded;                ///< Nodes of solids that are folded.
 
     /// Nodes around a cell of the membrane, -1 where there is none.
     [[nodiscard]] std::array<int, 4> NodesOf(int row_cell, int column_cell) const;
@@ -187,7 +189,7 @@ class CoarseSpace {
   CoarseGrid grid_;
   CoarseMatrix matrix_;
   Scratch scratch_;
-  bool coarse_off_ = false, organ_excluded_ = false;
+  bool coarse_off_ = false;
 };
 
 }  // namespace fulcrum::physics::implicit

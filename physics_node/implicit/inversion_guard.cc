@@ -52,6 +52,7 @@ InversionGuard::InversionGuard(const ElasticModel& model, std::span<const Index>
     }
   }
   found_.reserve(tets_.size());
+  folded_.reserve(parts_.size());
 }
 
 Eigen::Matrix3f InversionGuard::Gradient(std::size_t tet, const float* place) const {
@@ -100,6 +101,11 @@ void InversionGuard::Linearise(const float* place, std::span<const std::uint8_t>
   }
   std::erase_if(found_,
                 [](const Found& found) { return found.strain.squaredNorm() < kReleaseStrain * kReleaseStrain; });
+  folded_.clear();
+  for (const Part& part : parts_) {
+    const auto is_of_part = [&](const Found& found) { return found.tet >= part.first && found.tet < part.end; };
+    if (std::ranges::any_of(found_, is_of_part)) folded_.push_back(part.solid);
+  }
 }
 
 void InversionGuard::AddForce(float* residual) const {

@@ -31,8 +31,8 @@ class InversionGuard {
   /// examination (all of them within kScanSubsteps substeps; `computed` by solid, empty: all), and linearises those
   /// found so far.
   void Linearise(const float* place, std::span<const std::uint8_t> computed = {});
-  /// Some tetrahedra are guarded.
-  [[nodiscard]] bool folded() const { return !found_.empty(); }
+  /// Solids of which tetrahedra are guarded, ascending.
+  [[nodiscard]] std::span<const Index> folded() const { return folded_; }
   /// body(vertex) for the vertices of the tetrahedra found.
   template <class Body>
   void ForVerticesFound(const Body& body) const {
@@ -75,6 +75,7 @@ class InversionGuard {
   std::vector<Part> parts_;
   std::vector<Shape> shapes_;
   std::vector<Found> found_;
+  std::vector<Index> folded_;
   std::size_t next_ = 0;
 };
 

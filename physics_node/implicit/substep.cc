@@ -209,7 +209,7 @@ void LineariseVerticesAndLevels(const SolverContext& context, const Inertia& ine
 }
 
 void AddContactsToLevels(const Elements& elements, CoarseSpace* coarse) {
-  coarse->ExcludeOrgan(elements.guard().folded());
+  coarse->ExcludeSolids(elements.guard().folded());
   coarse->ClearContacts();
   for (const Element& contact : elements.contacts()) {
     if (Elements::IsStiff(contact)) {

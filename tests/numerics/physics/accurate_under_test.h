@@ -25,6 +25,11 @@ class AccurateUnderTest final : public StoreSolver {
     begin_ = places_;
   }
 
+  /// Puts a particle somewhere else, without a word to the solver.
+  void Place(Index particle, const Vec3f& p) {
+    particles_.Set(particles_.Ref(particle), p);
+    particles_.SetPrevious(particles_.Ref(particle), p);
+  }
   /// Fraction of the tissue that is awake after the last step.
   [[nodiscard]] float awake_part() const { return solver_.regions().awake_part(); }
 
