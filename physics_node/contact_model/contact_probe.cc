@@ -64,6 +64,7 @@ ContactProbe::ContactProbe(const TissueScene& scene, const TissueModel* model, c
       curvature_(scene, model, particles),
       compliance_(scene.physics.dt_s),
       step_s_(scene.physics.dt_s) {
+  for (const SheetProperties& of_row : PropertiesOfRows(scene)) Et_of_.push_back(of_row.Et_N_per_m);
   if (scene.physics.mode != PhysicsMode::kAccurate) elastic_.emplace(scene, model, particles);
 }
 
@@ -117,15 +118,17 @@ void ContactProbe::Enter(ToolMemory* memory, ContactKind kind) const {
     return;
   }
   std::vector<Index> buffer = std::move(memory->touched);
+  const float Et = memory->Et;
   const Vec3f tip = memory->tip;
   const Vec3f force =
       memory->kind == ContactKind::kNone || kind == ContactKind::kNone ? Vec3f::Zero().eval() : memory->force;
   *memory = {};
   memory->touched = std::move(buffer);
+  memory->Et = Et;
   memory->kind = kind;
   memory->tip = memory->x_ref = tip;
   memory->force = force;  // When jaws close on tissue that they press, the force continues.
-  memory->stiffness = std::clamp(kFirstBodyOverEt * scene_.physics.membrane_Et_N_per_m, kMinBody, kMaxBody);
+  memory->stiffness = std::clamp(kFirstBodyOverEt * Et, kMinBody, kMaxBody);
 }
 
 void ContactProbe::LowPass(ToolMemory* memory, const Vec3f& force, const Vec3f& u) const {
@@ -141,13 +144,17 @@ void ContactProbe::LowPass(ToolMemory* memory, const Vec3f& force, const Vec3f& 
   }
 }
 
-float ContactProbe::Skin() const {
-  return std::clamp(kSkinOverEt * scene_.physics.membrane_Et_N_per_m, kMinSkin, kMaxSkin);
+float ContactProbe::EtAt(Index particle) const {
+  const bool is_node = particle >= scene_.membrane.first && particle < scene_.rest_position.size();
+  return is_node ? Et_of_[(particle - scene_.membrane.first) / scene_.membrane.cols]
+                 : scene_.physics.membrane_Et_N_per_m;
 }
+
+float ContactProbe::Skin(const ToolMemory& memory) { return std::clamp(kSkinOverEt * memory.Et, kMinSkin, kMaxSkin); }
 
 float ContactProbe::InSeries(std::uint32_t tool) const {
   const Compliance& measured = compliance_.compliance(tool);
-  return 1.0f / (1.0f / Skin() + 1.0f / (measured.known ? measured.stiffness : tools_[tool].stiffness));
+  return 1.0f / (1.0f / Skin(tools_[tool]) + 1.0f / (measured.known ? measured.stiffness : tools_[tool].stiffness));
 }
 
 void ContactProbe::MedianFilter(std::uint32_t tool, const ToolForce& force) {
@@ -193,7 +200,7 @@ Contact ContactProbe::MakeContact(std::uint32_t tool) {
   contact.u_c = memory.u;
   contact.du_c = memory.du;
   contact.v_s = memory.v_s;
-  contact.k1 = Skin();
+  contact.k1 = Skin(memory);
   contact.kt = kTangentialOverSkin * contact.k1;
   contact.k_body = memory.stiffness;
   contact.b_body = kRelaxation * memory.stiffness;
@@ -238,6 +245,9 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
     }
   };
   if (grasp.holding()) {
+    // Nodes of the membrane come after the vertices of solids.
+    memory.Et =
+        EtAt(grasp.held().empty() ? kNoIndex : std::ranges::max(grasp.held(), {}, &HeldParticle::particle).particle);
     enter(ContactKind::kGrasp);
     memory.touched.clear();
     for (const HeldParticle& held : grasp.held()) {
@@ -267,6 +277,8 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
     enter(ContactKind::kNone);
     return device;
   }
+  const bool at_sheet = nearest.found && nearest.on_membrane;
+  memory.Et = EtAt(at_sheet ? scene_.membrane.first + model_->TriangleNodes(nearest.triangle)[0] : kNoIndex);
   enter(ContactKind::kSurface);
   Vec3f normal = Vec3f::Zero();
   for (const ContactPair& pair : collision.pairs()) {
@@ -286,7 +298,7 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   memory.normal = memory.normal.norm() > kMinNormal ? memory.normal.normalized() : Vec3f::UnitZ();
 
   Motion around;
-  if (nearest.found && nearest.on_membrane) {
+  if (at_sheet) {
     around = RingMotion(model_->TriangleNodes(nearest.triangle)[0]);
   }
   if (solver_ != nullptr && touching) {

@@ -68,6 +68,7 @@ class ContactProbe {
     Vec3f normal = Vec3f::Zero();
     Vec3f u = Vec3f::Zero(), du = Vec3f::Zero(), v_s = Vec3f::Zero();
     float stiffness = 0;
+    float Et = 0;  ///< Of the sheet that is nearest or held [N/m].
     std::vector<Index> touched;
     Vec3f tip = Vec3f::Zero();              ///< Of the tool in the last step.
     Vec3f x_ref = Vec3f::Zero();            ///< Tip position at which `force` acted.
@@ -84,9 +85,11 @@ class ContactProbe {
   void MedianFilter(std::uint32_t tool, const ToolForce& force);
   [[nodiscard]] Motion MeanMotion(std::span<const Index> particles) const;
   [[nodiscard]] Motion RingMotion(Index node) const;
+  /// Of the sheet of a node of the membrane; of another particle that of `physics`.
+  [[nodiscard]] float EtAt(Index particle) const;
   [[nodiscard]] Contact MakeContact(std::uint32_t tool);
   /// k1 of a surface, and of skin and body in series [N/m].
-  [[nodiscard]] float Skin() const;
+  [[nodiscard]] static float Skin(const ToolMemory& memory);
   [[nodiscard]] float InSeries(std::uint32_t tool) const;
   /// Weight of a new value in the low-pass filters.
   [[nodiscard]] float FilterShare() const;
@@ -96,6 +99,7 @@ class ContactProbe {
   const ParticleStore* particles_;
   std::optional<ElasticForce> elastic_;  ///< In modes without forces of the solver.
   std::vector<std::size_t> sheet_of_;    ///< By row of the membrane.
+  std::vector<float> Et_of_;             ///< Likewise [N/m].
   SurfaceCurvature curvature_;
   std::array<ToolMemory, kMaxTools> tools_;
   ComplianceProbe compliance_;

@@ -103,7 +103,8 @@ void CoarseSpace::UpdateRegions(const Regions& regions) {
   for (int r = 0; r < hats_.rows; ++r) {
     const auto i = static_cast<std::size_t>(r);
     const int first = r > 0 ? hats_.centre[i - 1] + 1 : 0, end = r + 1 < hats_.rows ? hats_.centre[i + 1] : sheet_rows_;
-    // A sheet at rest beside this one does not matter: the hats at the rim carry the coarse nodes' part, too.
+    // Rows of another sheet, and the empty ones before this, do not count: without the hats at its rim, which also
+    // carry the coarse nodes' part, corrections overshoot.
     const std::size_t sheet = grid_.sheet_of[static_cast<std::size_t>(hats_.centre[i])];
     for (int row = first; row < end; ++row) {
       if (grid_.sheet_of[static_cast<std::size_t>(row)] != sheet) continue;

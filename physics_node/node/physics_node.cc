@@ -347,8 +347,7 @@ void PhysicsNode::Measure() {
   figures_.quarantined.store(simulation_.quarantined(), std::memory_order_relaxed);
   figures_.grasped.store(simulation_.held_particles(), std::memory_order_relaxed);
   figures_.torn_edges.store(simulation_.tears().torn_count(), std::memory_order_relaxed);
-  figures_.stretch.store(simulation_.tears().largest_stretch(), std::memory_order_relaxed);
-  figures_.tear_stretch.store(simulation_.tears().limit(), std::memory_order_relaxed);
+  figures_.nearest_to_tearing.store(simulation_.tears().nearest(), std::memory_order_relaxed);
   figures_.largest_stretch.store(simulation_.tears().largest_stretch_ever(), std::memory_order_relaxed);
   std::uint32_t limited = 0;
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
@@ -419,14 +418,25 @@ void PhysicsNode::FillHealth(Health* health) const {
   add("topology_edits", static_cast<double>(figures_.topology_edits.load(std::memory_order_relaxed)));
   add("torn_edges", figures_.torn_edges.load(std::memory_order_relaxed));
   add("largest_stretch", figures_.largest_stretch.load(std::memory_order_relaxed));
-  for (std::uint32_t i = 0; i < kMaxTools; ++i) {
-    if ((figures_.limited.load(std::memory_order_relaxed) >> i & 1u) != 0) {
-      warn("force on tool " + std::to_string(i) + " limited to " +
-           std::to_string(static_cast<int>(ContactProbe::kForceCap_N)) + " N");
-    }
+  // The gravest first: Health has room for 255 characters.
+  if (const std::uint64_t refused = figures_.topology_refused.load(std::memory_order_relaxed); refused > 0) {
+    add("topology_refused", static_cast<double>(refused));
+    warn("TopologyState or OpenCells of another scene refused");
   }
-  const float limit = figures_.tear_stretch.load(std::memory_order_relaxed),
-              stretch = figures_.stretch.load(std::memory_order_relaxed);
+  if (const float pace = figures_.pace.load(std::memory_order_relaxed); static_cast<double>(pace) < Pace::kSlow) {
+    warn("steps take longer than " + std::to_string(TissueSimulation::kMostStepPeriods) +
+         " periods: the tissue moves at " + std::to_string(std::lround(100 * pace)) + " % of real time");
+  }
+  std::string limited;
+  for (std::uint32_t i = 0; i < kMaxTools; ++i) {
+    if ((figures_.limited.load(std::memory_order_relaxed) >> i & 1u) == 0) continue;
+    limited += (limited.empty() ? "" : ", ") + std::to_string(i);
+  }
+  if (!limited.empty()) {
+    warn("force on tool " + limited + " limited to " + std::to_string(static_cast<int>(ContactProbe::kForceCap_N)) +
+         " N");
+  }
+  const auto [stretch, limit] = figures_.nearest_to_tearing.load(std::memory_order_relaxed);
   if (limit > 0 && stretch > TearWatch::kNear * limit) {
     char text[64];
     std::snprintf(text, sizeof(text), "membrane near tearing: stretch %.2f of %.2f", static_cast<double>(stretch),
@@ -439,14 +449,6 @@ void PhysicsNode::FillHealth(Health* health) const {
   }
   if (const std::uint64_t lost = figures_.lost_periods.load(std::memory_order_relaxed); lost > 0) {
     add("time_lost_s", static_cast<double>(lost) * static_cast<double>(scene_.physics.dt_s));
-  }
-  if (const float pace = figures_.pace.load(std::memory_order_relaxed); static_cast<double>(pace) < Pace::kSlow) {
-    warn("steps take longer than " + std::to_string(TissueSimulation::kMostStepPeriods) +
-         " periods: the tissue moves at " + std::to_string(std::lround(100 * pace)) + " % of real time");
-  }
-  if (const std::uint64_t refused = figures_.topology_refused.load(std::memory_order_relaxed); refused > 0) {
-    add("topology_refused", static_cast<double>(refused));
-    warn("TopologyState or OpenCells of another scene refused");
   }
 }
 

@@ -160,7 +160,8 @@ class PhysicsNode {
     std::atomic<std::uint64_t> quarantined{0}, asleep_ticks{0}, topology_refused{0}, topology_edits{0};
     std::atomic<std::uint32_t> torn_edges{0};
     std::atomic<std::uint32_t> limited{0};  ///< Bit per tool: the force on it was limited.
-    std::atomic<float> stretch{0}, tear_stretch{0}, largest_stretch{0};
+    std::atomic<TearWatch::Nearest> nearest_to_tearing{};
+    std::atomic<float> largest_stretch{0};
     std::atomic<float> pace{1};                  ///< Simulated over passed time.
     std::atomic<std::uint64_t> lost_periods{0};  ///< That passed and were not simulated.
   };

@@ -34,7 +34,7 @@ std::uint32_t CountBits(std::span<const std::uint8_t> bits) {
   return count;
 }
 
-/// Whether a value is a larger part of its limit than another one of its own.
+/// True if value / limit > other / other_limit.
 bool IsNearer(float value, float limit, float other, float other_limit) {
   return limit == other_limit ? value > other : value * other_limit > other * limit;
 }
@@ -60,7 +60,7 @@ TearWatch::TearWatch(const TissueScene& scene, const TissueModel* model, const P
   for (const SheetProperties& of_row : PropertiesOfRows(scene)) {
     limits_.push_back(of_row.tear_stretch > 0.0f ? of_row.tear_stretch : kNever);
   }
-  if (std::ranges::all_of(limits_, [](float limit) { return limit == kNever; })) {
+  if (rows_ < 2 || cols_ < 2 || std::ranges::all_of(limits_, [](float limit) { return limit == kNever; })) {
     limits_.clear();
     return;
   }
@@ -198,8 +198,8 @@ bool TearWatch::Evaluate(std::uint64_t step) {
   ++pass_;
   const auto near = [this](std::uint32_t row) { return kNear * limits_[row] / to_rest_; };
   const bool all = step % kEveryAll == 0;
-  float largest2 = 0;
-  std::uint32_t largest_row = 0;
+  float largest2 = 0, nearest2 = 0;
+  std::uint32_t largest_row = 0, nearest_row = 0;
   for (std::uint32_t row = 0; row + 1 < rows_; ++row) {
     const bool may_be_near =
         std::sqrt(cell_rows_.stretch2[row]) + cell_rows_.gain[row] * cell_rows_.moved[row] >= near(row);
@@ -207,24 +207,30 @@ bool TearWatch::Evaluate(std::uint64_t step) {
       cell_rows_.stretch2[row] = LargestInRow(row);
       cell_rows_.moved[row] = 0;
     }
-    const float limit = limits_[row], limit_there = limits_[largest_row];
-    if (IsNearer(cell_rows_.stretch2[row], limit * limit, largest2, limit_there * limit_there)) {
-      largest2 = cell_rows_.stretch2[row];
+    const float stretch2 = cell_rows_.stretch2[row], limit = limits_[row], limit_there = limits_[nearest_row];
+    if (IsNearer(stretch2, limit * limit, nearest2, limit_there * limit_there)) {
+      nearest2 = stretch2;
+      nearest_row = row;
+    }
+    if (stretch2 > largest2) {
+      largest2 = stretch2;
       largest_row = row;
     }
   }
-  // Nodes of the rows near the limit, and those of the most stretched one.
+  // Nodes of the rows near their limit, of the one nearest to it, and of the most stretched one.
   std::uint32_t worst_row = 0, worst_col = 0, done = 0;
-  largest_ = 0;
+  largest_ = nearest_.stretch = 0;
   for (std::uint32_t row = 0; row + 1 < rows_; ++row) {
-    if (row != largest_row && !(cell_rows_.stretch2[row] >= near(row) * near(row))) continue;
+    if (row != largest_row && row != nearest_row && !(cell_rows_.stretch2[row] >= near(row) * near(row))) continue;
     const auto reach = static_cast<std::uint32_t>(scales_[sheet_of_[row]].by_rows.size());
     const std::uint32_t end = std::min(row + reach + 1, rows_);
     for (std::uint32_t r = std::max(done, row + 1 > reach ? row + 1 - reach : 0); r < end; ++r) {
       SmoothRow(r);
       for (std::uint32_t c = 0; c < cols_; ++c) {
-        if (IsNearer(smooth_.values[r * cols_ + c], limits_[r], largest_, limits_[worst_row])) {
-          largest_ = smooth_.values[r * cols_ + c];
+        const float stretch = smooth_.values[r * cols_ + c];
+        largest_ = std::max(largest_, stretch);
+        if (IsNearer(stretch, limits_[r], nearest_.stretch, limits_[worst_row])) {
+          nearest_.stretch = stretch;
           worst_row = r;
           worst_col = c;
         }
@@ -232,13 +238,13 @@ bool TearWatch::Evaluate(std::uint64_t step) {
     }
     done = std::max(done, end);
   }
-  limit_there_ = limits_[worst_row];
+  nearest_.limit = limits_[worst_row];
   const bool paused = Paused();
   if (schedule_.step >= schedule_.quiet_until) largest_ever_ = std::max(largest_ever_, largest_);
   if (paused) return false;
   const std::uint32_t before = torn_count_;
   TearBareEdges();
-  if (largest_ >= limit_there_) Crack(worst_row, worst_col);
+  if (nearest_.stretch >= nearest_.limit) Crack(worst_row, worst_col);
   if (torn_count_ != before) schedule_.torn_step = schedule_.step;
   return torn_count_ != before;
 }

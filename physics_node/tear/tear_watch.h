@@ -7,10 +7,10 @@
 //   lambda = (1 + prestrain) sqrt(largest eigenvalue of <G>^-1 <g>)
 //
 // This is an average of right Cauchy-Green tensors, so folds and rotations do not contribute. Where lambda reaches the
-// scene's tear_stretch, a crack begins at the most stretched place, across the direction of the principal stretch, and
-// extends as far as lambda exceeds kNear of the limit, at most kAdvance_m to either side. All edges that it crosses are
-// torn. The next crack begins after these have been severed and the tissue has moved. An edge without a living triangle
-// (a bare edge) tears by its own stretch.
+// limit of its sheet, a crack begins where it is nearest to its limit, across the direction of the principal stretch,
+// and extends as far as lambda exceeds kNear of the limit, at most kAdvance_m to either side. All edges that it crosses
+// are torn. The next crack begins after these have been severed and the tissue has moved. An edge without a living
+// triangle (a bare edge) tears by its own stretch.
 //
 // Shrinking by heat is no stretch: C refers to the shape at rest, as published failure stretches do. Torn edges
 // transmit forces until the owner of the topology has severed them (TopologyState).
@@ -62,11 +62,14 @@ class TearWatch {
   /// Edges (3 * node + direction) that have torn since the start: bits as in TearState.
   [[nodiscard]] std::span<const std::uint8_t> torn() const { return torn_; }
   [[nodiscard]] std::uint32_t torn_count() const { return torn_count_; }
-  /// lambda at the last examination where it comes nearest to the limit, in proportion.
+  /// lambda where it is the greatest share of the limit of its sheet, at the last examination; and that limit.
+  struct Nearest {
+    float stretch = 0, limit = 0;
+  };
+  [[nodiscard]] Nearest nearest() const { return nearest_; }
+  /// The largest lambda at the last examination, whatever its limit.
   [[nodiscard]] float largest_stretch() const { return largest_; }
-  /// The limit there.
-  [[nodiscard]] float limit() const { return limit_there_; }
-  /// The largest of these since the start.
+  /// The largest since the start.
   [[nodiscard]] float largest_stretch_ever() const { return largest_ever_; }
 
   /// False if a bit is set for an edge that this mesh does not have.
@@ -156,7 +159,8 @@ class TearWatch {
     bool topology_changed = false, restored = false;  ///< Since the last examination.
   };
   Schedule schedule_;
-  float largest_ = 0, largest_ever_ = 0, limit_there_ = 0;
+  Nearest nearest_;
+  float largest_ = 0, largest_ever_ = 0;
 };
 
 }  // namespace fulcrum::physics

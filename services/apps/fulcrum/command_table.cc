@@ -10,7 +10,7 @@ std::span<const CommandEntry> Commands() {
       {"up", "up SCENE [options]",
        "Run a session: compile the scene if needed, start and supervise its nodes, write a report.",
        "up built-in --seconds 20 --record", Up},
-      {"scene", "scene new|check|preview|explain|schema|list ...",
+      {"scene", "scene new|check|preview|explain|schema|list|materials ...",
        "Make a scene around a mesh of an organ, check and draw a scene, explain a key.",
        "scene new liver --from liver.stl", Scene},
       {"import-anatomy", "import-anatomy LABELS [--map FILE --out DIR]",

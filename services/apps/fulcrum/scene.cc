@@ -2,6 +2,7 @@
 #include <array>
 #include <cstdio>
 #include <iostream>
+#include <optional>
 
 #include "services/apps/fulcrum/commands.h"
 #include "services/base/config/json_schema.h"
@@ -49,13 +50,35 @@ std::string SceneFile(const std::string& name) {
 /// Every key that is read for the shipped scenes, once.
 std::vector<config::KeyRule> AllRules() {
   std::vector<config::KeyRule> all;
-  // Keys of lists are known where a scene has them.
-  for (const char* scene : {"openhelp", "built-in", "dissection", "assisted", "gallbladder", "pelvis", "adhesions"}) {
-    for (config::KeyRule& rule :
-         scene::SceneRules(runtime::ShareFolder() / "scenes" / (std::string(scene) + ".yaml"))) {
+  const auto add = [&](std::vector<config::KeyRule> rules) {
+    for (config::KeyRule& rule : rules) {
       const auto is_same = [&](const config::KeyRule& other) { return other.path == rule.path; };
       if (std::none_of(all.begin(), all.end(), is_same)) all.push_back(std::move(rule));
     }
+  };
+  // Keys of lists are known where a scene has them.
+  for (const char* scene : {"openhelp", "built-in", "dissection", "assisted", "gallbladder", "pelvis"}) {
+    add(scene::SceneRules(runtime::ShareFolder() / "scenes" / (std::string(scene) + ".yaml")));
+  }
+  // Defaults of a sheet that names no material come before those of one that does.
+  constexpr const char* kSheet =
+      "name: sheet\nbodies: [{name: b, material: fat, shape: {ellipsoid_mm: [20, 20, 20]}}]\n"
+      "sheets: [{name: s, over: b, at_mm: [0, 0, 20], facing: [0, 0, 1], width_mm: 20, length_mm: 20}]\n";
+  add(scene::ParseSceneYaml(kSheet, "sheet.yaml", {}).rules);
+  add(scene::SceneRules(runtime::ShareFolder() / "scenes" / "adhesions.yaml"));
+  // What a material says is no default of the key, and a sheet lies over a body or between two lines.
+  constexpr std::array kOptional{"bodies[].look",
+                                 "bodies[].youngs_modulus_kPa",
+                                 "bodies[].density_kg_m3",
+                                 "sheets[].over",
+                                 "sheets[].at_mm",
+                                 "sheets[].facing",
+                                 "sheets[].width_mm",
+                                 "sheets[].length_mm",
+                                 "sheets[].youngs_modulus_kPa",
+                                 "sheets[].thickness_mm"};
+  for (config::KeyRule& rule : all) {
+    if (std::ranges::find(kOptional, rule.path) != kOptional.end()) rule.standard = "";
   }
   return all;
 }
@@ -96,11 +119,24 @@ void Explain(const std::string& text) {
   }
 }
 
-void ListMaterials(const std::vector<fs::path>& beside) {
+/// `scene`: none, or one beside which there may be more.
+void ListMaterials(const std::optional<std::string>& scene) {
+  std::vector<fs::path> beside;
+  if (scene) {
+    const fs::path file = SceneFile(*scene);
+    std::error_code error;
+    if (!fs::is_regular_file(file, error)) throw InputError("scene materials: no scene '" + *scene + "'");
+    beside.push_back(file.parent_path());
+  }
   const scene::MaterialLibrary library(beside);
   std::printf("%-12s %10s  %-14s %8s  %s\n", "", "E, kPa", "spread, kPa", "kg/m3", "source");
   for (const std::string& name : library.Names()) {
-    const std::optional<scene::NamedMaterial> read = library.Find(name);
+    std::optional<scene::NamedMaterial> read;
+    try {
+      read = library.Find(name);
+    } catch (const InputError& error) {
+      std::printf("%-12s refused: %s\n", name.c_str(), error.what());
+    }
     if (!read) continue;
     std::array<char, 40> spread{}, sheet{};
     std::snprintf(spread.data(), spread.size(), "%g to %g", 1e-3 * read->least_Pa, 1e-3 * read->most_Pa);
@@ -144,9 +180,7 @@ ExitCode Scene(const Words& words) {
     std::cout << config::JsonSchema(RulesForEditors(), "Fulcrum scene");
     return ExitCode::kDone;
   } else if (what == "materials") {
-    std::vector<fs::path> beside;
-    if (words.size() > 1) beside.push_back(fs::path(SceneFile(words[1])).parent_path());
-    ListMaterials(beside);
+    ListMaterials(words.size() > 1 ? std::optional(words[1]) : std::nullopt);
     return ExitCode::kDone;
   } else if (what == "list") {
     command.emplace_back("--list");

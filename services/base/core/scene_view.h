@@ -204,7 +204,7 @@ struct SheetPart {
   char name[32];
   std::uint32_t first_row, rows, cols;
   Index over;  ///< Number of the solid that it covers; kNoIndex: spanned freely, with air on both sides.
-  /// In place of those of PhysicsParams; 0: those.
+  /// Of its own [N/m], [N m], [Pa], stretch; 0: the value of PhysicsParams.
   float Et_N_per_m = 0, bending_Nm = 0, fat_youngs_modulus_Pa = 0, tear_stretch = 0;
 };
 

@@ -46,7 +46,7 @@ inline constexpr std::uint32_t kRowsBetweenSheets = 8;
   return of;
 }
 
-/// What a sheet is made of: physics.membrane_Et_N_per_m and so on, where it has none of its own.
+/// Material of a sheet: its own values, else those of `physics`.
 struct SheetProperties {
   float Et_N_per_m, bending_Nm, fat_youngs_modulus_Pa, tear_stretch;
 };

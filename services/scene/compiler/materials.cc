@@ -14,12 +14,12 @@ using config::Range;
 using config::StrictMap;
 using config::StrictYaml;
 
-constexpr std::size_t kLongestSource = 500;
+constexpr std::size_t kLongestSource = 500, kLongestName = 31;
 const Range kModulus_kPa = Range::Between(0.01, 1e4);
 
 /// A name is part of a path, which must not lead out of the folder.
 bool IsName(const std::string& name) {
-  return !name.empty() && std::ranges::all_of(name, [](char c) {
+  return !name.empty() && name.size() <= kLongestName && std::ranges::all_of(name, [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
   });
 }
@@ -37,8 +37,8 @@ NamedMaterial Read(const fs::path& file) {
     root.Fail("spread_kPa", "must contain youngs_modulus_kPa");
   }
   read.material.density_kg_m3 = root.NumberSi("density_kg_m3", Range::Between(100, 2e4));
-  read.thickness_m = root.NumberSi("thickness_mm", 0, Range::Between(0, 5));
-  read.tear_stretch = root.Number("tear_stretch", 0, Range::Between(0, 10));
+  if (root.Has("thickness_mm")) read.thickness_m = root.NumberSi("thickness_mm", Range::Between(0.01, 5));
+  if (root.Has("tear_stretch")) read.tear_stretch = root.Number("tear_stretch", Range::Above(1, 10));
   read.source = root.Text("source", kLongestSource);
   yaml.Finish();
   return read;
@@ -53,7 +53,7 @@ const StrictMap::Choices<SolidLook> kSolidLookNames = {
     {"artery", SolidLook::kArtery}, {"vein", SolidLook::kVein},
     {"ureter", SolidLook::kUreter}, {"nerve", SolidLook::kNerve}};
 
-MaterialLibrary::MaterialLibrary(const std::vector<fs::path>& beside) {
+MaterialLibrary::MaterialLibrary(const std::vector<fs::path>& beside, Files files) : files_(files) {
   for (const fs::path& folder : beside) folders_.push_back(folder / "materials");
   folders_.push_back(runtime::ShareFolder() / "materials");
 }
@@ -72,17 +72,20 @@ std::vector<std::string> MaterialLibrary::Names() const {
   std::set<std::string> names;
   for (const fs::path& folder : folders_) {
     std::error_code error;
-    for (const auto& entry : fs::directory_iterator(folder, error)) {
-      if (entry.path().extension() == ".yaml") names.insert(entry.path().stem().string());
+    for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+      const std::string name = entry->path().stem().string();
+      if (entry->path().extension() == ".yaml" && IsName(name)) names.insert(name);
     }
   }
   return {names.begin(), names.end()};
 }
 
 std::string MaterialLibrary::Unknown(const std::string& name) const {
-  std::string text = "'" + name + "' is not one of ";
-  for (const std::string& known : Names()) text += known + ", ";
-  return text + "nor materials/" + (IsName(name) ? name : "NAME") + ".yaml beside the scene";
+  std::string known;
+  for (const std::string& one : Names()) known += (known.empty() ? "" : ", ") + one;
+  const bool only_shipped = folders_.size() == 1;
+  return "'" + name + "' is not one of " + known +
+         (only_shipped ? "" : "; another one: materials/" + (IsName(name) ? name : "NAME") + ".yaml beside the scene");
 }
 
 }  // namespace fulcrum::scene

@@ -24,18 +24,26 @@ struct NamedMaterial {
 /// NAME.yaml in the folders `materials` beside files of scenes, then among the shipped ones.
 class MaterialLibrary {
  public:
+  enum class Files {
+    kNeeded,
+    /// Not read where a description replaces all that they say, as the effective YAML of a compiled scene does.
+    kReplaced
+  };
   /// @param beside folders of files of scenes; of two materials of one name the first counts.
-  explicit MaterialLibrary(const std::vector<std::filesystem::path>& beside = {});
+  explicit MaterialLibrary(const std::vector<std::filesystem::path>& beside = {}, Files files = Files::kNeeded);
+
+  [[nodiscard]] Files files() const { return files_; }
 
   /// nullopt: none of this name. Throws InputError if its file is malformed.
   [[nodiscard]] std::optional<NamedMaterial> Find(const std::string& name) const;
   /// Sorted.
   [[nodiscard]] std::vector<std::string> Names() const;
-  /// For refusals: "'NAME' is not one of ...".
+  /// For refusals: "'NAME' is not one of ...", and where another one can be put.
   [[nodiscard]] std::string Unknown(const std::string& name) const;
 
  private:
   std::vector<std::filesystem::path> folders_;
+  Files files_;
 };
 
 }  // namespace fulcrum::scene

@@ -327,7 +327,8 @@ std::uint32_t ReadNodes(StrictMap* root, std::uint32_t all) {
 }
 
 /// @param bases folders to which relative names of the description refer.
-SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesystem::path& data) {
+SceneDescription Read(StrictYaml* yaml, const Folders& bases, const MaterialLibrary& materials,
+                      const std::filesystem::path& data) {
   SceneSettings scene;
   StrictMap root = yaml->root();
   scene.name = root.Text("name", 63);
@@ -347,7 +348,7 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesys
   const auto find = [&](const StrictMap& map, const std::string& key) {
     return FindFile(map, key, StrictMap(map).Text(key), folders);
   };
-  ReadBodies(&root, find, MaterialLibrary(bases), &scene);
+  const std::vector<StrictMap> sheets = ReadBodies(&root, find, materials, &scene);
   if (scene.has_organ) ReadMembrane(root.MapOrDefaults("membrane"), &scene.membrane);
   const bool has_sheets = scene.has_organ || !scene.sheets.empty();
   for (StrictMap& entry : root.Maps("structures", 0, kMaxStructures)) {
@@ -361,6 +362,12 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesys
     ReadTool(tools.MapOrDefaults(key), folders, scene.render, &scene.tools[i], &scene.tool_meshes[i]);
   }
   ReadPhysics(root.MapOrDefaults("physics"), &scene.physics);
+  for (std::size_t i = 0; i < sheets.size(); ++i) {
+    const float limit = scene.sheets[i].own.tear_stretch;
+    if (limit != 0.0f && !(limit > 1.0f + scene.physics.membrane_prestrain)) {
+      sheets[i].Fail("tear_stretch", "must be above 1 + physics.membrane_prestrain, or 0 (that of `physics`)");
+    }
+  }
   ReadBreathing(root.MapOrDefaults("breathing"), scene.physics.mode, &scene.breathing);
   ReadThermal(root.MapOrDefaults("thermal"), &scene.thermal);
   ReadHaptics(root.MapOrDefaults("haptics"), &scene.haptics);
@@ -397,7 +404,7 @@ SceneDescription ReadFile(const std::filesystem::path& file, const std::filesyst
   for (const auto& from : yaml.files()) {
     if (std::find(bases.begin(), bases.end(), from.parent_path()) == bases.end()) bases.push_back(from.parent_path());
   }
-  return Read(&yaml, bases, data);
+  return Read(&yaml, bases, MaterialLibrary(bases), data);
 }
 
 }  // namespace
@@ -435,7 +442,7 @@ SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, co
   StrictYaml yaml = StrictYaml::FromText(text, name);
   Folders here;
   here.emplace_back();
-  return Read(&yaml, here, data);
+  return Read(&yaml, here, MaterialLibrary({}, MaterialLibrary::Files::kReplaced), data);
 }
 
 std::vector<SceneSummary> ListScenes(const std::filesystem::path& folder) {

@@ -17,6 +17,7 @@ using config::StrictMap;
 
 constexpr std::size_t kMostLinePoints = 64;
 constexpr std::size_t kMostAttachments = 400;
+constexpr double kLeastDensity_kg_m2 = 0.01;
 constexpr float kLeastStep_m = 1e-4f;              ///< Between two points of a line.
 constexpr int kBendingRows = 4, kBendingCols = 7;  ///< Largest strides of the hinges, as of the built-in membrane.
 constexpr double kBindingReach_m = 0.0013;         ///< Beyond the gap, likewise.
@@ -37,19 +38,21 @@ void ReadSwept(StrictMap* map, ShapeSettings* shape) {
   if (shape->radius_m.size() != shape->line_m.size()) map->Fail("radius_mm", "must have one entry, or as many as x_mm");
 }
 
-/// The material that a body or sheet names. Its file may be missing where the description replaces all that it says, as
-/// in the effective YAML of a compiled scene.
-NamedMaterial ReadNamed(StrictMap* map, const MaterialLibrary& materials, std::initializer_list<const char*> replaced) {
-  const std::string name = map->Text("material", 31);
-  const std::optional<NamedMaterial> named = materials.Find(name);
-  if (!named && !std::ranges::all_of(replaced, [map](const char* key) { return map->Has(key); })) {
-    map->Fail("material", materials.Unknown(name));
+/// The material that a body or sheet names. `said`: the keys that replace all that its file says.
+NamedMaterial FindNamed(const StrictMap& map, const std::string& name, const MaterialLibrary& materials,
+                        std::initializer_list<const char*> said) {
+  if (materials.files() == MaterialLibrary::Files::kReplaced &&
+      std::ranges::all_of(said, [&](const char* key) { return map.Has(key); })) {
+    return {};
   }
-  return named.value_or(NamedMaterial{});
+  const std::optional<NamedMaterial> named = materials.Find(name);
+  if (!named) map.Fail("material", materials.Unknown(name));
+  return *named;
 }
 
 Material ReadMaterial(StrictMap* map, const MaterialLibrary& materials) {
-  Material material = ReadNamed(map, materials, {"look", "youngs_modulus_kPa", "density_kg_m3"}).material;
+  const std::string name = map->Text("material", 31);
+  Material material = FindNamed(*map, name, materials, {"look", "youngs_modulus_kPa", "density_kg_m3"}).material;
   material.look = map->Choice("look", material.look, kSolidLookNames);
   ReadSi(map, "youngs_modulus_kPa", Range::Between(0.01, 1e4), &material.youngs_modulus_Pa);
   ReadSi(map, "density_kg_m3", Range::Between(100, 2e4), &material.density_kg_m3);
@@ -106,27 +109,33 @@ double BendingOf(double youngs_modulus_Pa, double thickness_m) {
 
 /// What a sheet is made of, if it does not leave that to the section `physics`.
 void ReadSheetMaterial(StrictMap* map, const MaterialLibrary& materials, SheetSettings* sheet) {
+  constexpr double kLeastEt_N_per_m = 1e-3;
+  constexpr float kLeastFat_Pa = 1;
   double tear_stretch = 0;
-  if (map->Has("material")) {
-    NamedMaterial named = ReadNamed(map, materials, {"youngs_modulus_kPa", "thickness_mm"});
+  if (const std::string name = map->TextOr("material", "", 31); !name.empty()) {
+    NamedMaterial named =
+        FindNamed(*map, name, materials, {"youngs_modulus_kPa", "thickness_mm", "density_kg_m2", "tear_stretch"});
     double& modulus_Pa = named.material.youngs_modulus_Pa;
     ReadSi(map, "youngs_modulus_kPa", Range::Between(0.01, 1e4), &modulus_Pa);
     if (named.thickness_m == 0 && !map->Has("thickness_mm")) {
       map->Fail("material", "has no thickness: give the sheet's `thickness_mm`");
     }
     ReadSi(map, "thickness_mm", Range::Between(0.01, 5), &named.thickness_m);
+    if (modulus_Pa * named.thickness_m < kLeastEt_N_per_m) {
+      map->Fail("thickness_mm", "times youngs_modulus_kPa must be at least 0.001 N/m");
+    }
     sheet->own.Et_N_per_m = static_cast<float>(modulus_Pa * named.thickness_m);
     sheet->own.bending_Nm = static_cast<float>(BendingOf(modulus_Pa, named.thickness_m));
-    sheet->grid.density_kg_m2 = named.material.density_kg_m3 * named.thickness_m;
+    sheet->grid.density_kg_m2 = std::max(named.material.density_kg_m3 * named.thickness_m, kLeastDensity_kg_m2);
     tear_stretch = named.tear_stretch;
   }
-  ReadSi(map, "density_kg_m2", Range::Between(0.01, 50), &sheet->grid.density_kg_m2);
+  ReadSi(map, "density_kg_m2", Range::Between(kLeastDensity_kg_m2, 50), &sheet->grid.density_kg_m2);
   sheet->own.fat_youngs_modulus_Pa =
       static_cast<float>(map->NumberSi("fat_youngs_modulus_kPa", 0, Range::Between(0, 1e6)));
-  sheet->own.tear_stretch = static_cast<float>(map->Number("tear_stretch", tear_stretch, Range::Between(0, 10)));
-  if (sheet->own.tear_stretch != 0.0f && !(sheet->own.tear_stretch > 1.0f)) {
-    map->Fail("tear_stretch", "must be above 1, or 0 (that of `physics`)");
+  if (sheet->own.fat_youngs_modulus_Pa > 0.0f && sheet->own.fat_youngs_modulus_Pa < kLeastFat_Pa) {
+    map->Fail("fat_youngs_modulus_kPa", "must be at least 0.001, or 0 (that of `physics`)");
   }
+  sheet->own.tear_stretch = static_cast<float>(map->Number("tear_stretch", tear_stretch, Range::Between(0, 10)));
 }
 
 SheetSettings ReadSheet(StrictMap map, const MaterialLibrary& materials) {
@@ -207,7 +216,8 @@ ShapeSettings ReadShape(StrictMap map) {
   return shape;
 }
 
-void ReadBodies(StrictMap* root, const FindMesh& find, const MaterialLibrary& materials, SceneSettings* scene) {
+std::vector<StrictMap> ReadBodies(StrictMap* root, const FindMesh& find, const MaterialLibrary& materials,
+                                  SceneSettings* scene) {
   std::set<std::string> names;
   if (scene->has_organ) names.insert("organ");
   for (StrictMap& entry : root->Maps("bodies", 0, kMostBodies)) {
@@ -216,7 +226,8 @@ void ReadBodies(StrictMap* root, const FindMesh& find, const MaterialLibrary& ma
   }
   const std::set<std::string> bodies = names;
   const std::string organ = scene->has_organ ? ", nor `organ`" : "";
-  for (StrictMap& entry : root->Maps("sheets", 0, kMaxSheets - 1)) {
+  std::vector<StrictMap> sheets = root->Maps("sheets", 0, kMaxSheets - 1);
+  for (StrictMap& entry : sheets) {
     const SheetSettings& sheet = scene->sheets.emplace_back(ReadSheet(entry, materials));
     if (!sheet.over.empty() && !bodies.contains(sheet.over)) {
       entry.Fail("over", "'" + sheet.over + "' is no body of this scene");
@@ -237,6 +248,7 @@ void ReadBodies(StrictMap* root, const FindMesh& find, const MaterialLibrary& ma
     ReadSi(&entry, "youngs_modulus_kPa", Range::Between(0.001, 1e4), &attach.youngs_modulus_Pa);
     scene->attach.push_back(attach);
   }
+  return sheets;
 }
 
 }  // namespace fulcrum::scene

@@ -22,6 +22,8 @@ ShapeSettings ReadShape(config::StrictMap map);
 using FindMesh = std::function<std::filesystem::path(const config::StrictMap&, const std::string& key)>;
 
 /// `bodies`, `sheets` and `attach` of a description, whose organ is known.
-void ReadBodies(config::StrictMap* root, const FindMesh& find, const MaterialLibrary& materials, SceneSettings* scene);
+/// @return the maps of the sheets, for what depends on later sections.
+std::vector<config::StrictMap> ReadBodies(config::StrictMap* root, const FindMesh& find,
+                                          const MaterialLibrary& materials, SceneSettings* scene);
 
 }  // namespace fulcrum::scene

@@ -60,7 +60,8 @@ std::vector<std::string> PathWords(const std::string& yaml) {
 /// Every word that names an existing file, in the scene's folder, the data folder or a folder that the YAML names,
 /// counts as an input: a superfluous input costs a compilation, a missing one would run an outdated anatomy.
 void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const SceneRequest& request,
-                     std::set<fs::path>* seen, Hash64* hash) {
+                     std::set<fs::path>* seen, std::set<fs::path>* folders, Hash64* hash) {
+  folders->insert(folder);
   const fs::path& data = request.data;
   const std::vector<std::string> words = PathWords(yaml);
   std::vector<fs::path> bases{folder};
@@ -80,10 +81,13 @@ void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const Scen
     const std::string name =
         begin == std::string::npos ? "" : yaml.substr(begin, yaml.find_first_of(" \t\r\n\"'#", begin) - begin);
     const fs::path named = request.library / (name + ".yaml");
-    if (fs::is_regular_file(folder / name, error)) AddFile(hash, folder / name);
+    if (fs::is_regular_file(folder / name, error)) {
+      AddFile(hash, folder / name);
+      folders->insert((folder / name).parent_path());
+    }
     if (fs::is_regular_file(named, error) && seen->insert(fs::canonical(named, error)).second) {
       AddFile(hash, fs::canonical(named, error));
-      AddFilesNamedIn(ReadText(named), fs::canonical(named, error).parent_path(), request, seen, hash);
+      AddFilesNamedIn(ReadText(named), fs::canonical(named, error).parent_path(), request, seen, folders, hash);
     }
   }
   for (const std::string& word : words) {
@@ -92,7 +96,7 @@ void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const Scen
         AddFile(hash, base / word);
         // A base scene may name further files.
         if (fs::path(word).extension() == ".yaml" && seen->insert(fs::canonical(base / word, error)).second) {
-          AddFilesNamedIn(ReadText(base / word), (base / word).parent_path(), request, seen, hash);
+          AddFilesNamedIn(ReadText(base / word), (base / word).parent_path(), request, seen, folders, hash);
         }
       }
     }
@@ -183,11 +187,10 @@ fs::path ResolveScene(const SceneRequest& request) {
     hash.Add(std::string_view(change + "\n"));
   }
   AddFile(&hash, request.compiler);
-  std::set<fs::path> seen;
-  AddFilesNamedIn(yaml, source.parent_path(), request, &seen, &hash);
-  seen.insert(source);
-  for (const fs::path& file : std::set<fs::path>(seen)) AddMaterials(file.parent_path(), &hash);
-  AddMaterials(request.library.parent_path(), &hash);
+  // Materials are looked for beside the scene and its bases.
+  std::set<fs::path> seen, folders{request.library.parent_path()};
+  AddFilesNamedIn(yaml, source.parent_path(), request, &seen, &folders, &hash);
+  for (const fs::path& folder : folders) AddMaterials(folder, &hash);
   std::array<char, 24> key{};
   std::snprintf(key.data(), key.size(), "-%016llx", static_cast<unsigned long long>(hash.value()));
   fs::path target = request.cache / (source.stem().string() + key.data() + ".fulcrum");

@@ -8,6 +8,7 @@
 #include "physics_node/node/physics_node.h"
 #include "physics_node/simulation/script_player.h"
 #include "services/scene/builder/build.h"
+#include "tests/support/whole_topology.h"
 #include "tests/unit/physics/node_bench.h"
 
 namespace fulcrum::physics {
@@ -292,6 +293,22 @@ TEST_F(PhysicsNodeTest, WarnsBeforeTheMembraneTears) {
   EXPECT_EQ(health.last_error.rfind("membrane near tearing: stretch 2.0", 0), 0u)
       << health.last_error << "; largest stretch " << bench.Figure("largest_stretch");
   EXPECT_EQ(bench.Figure("torn_edges"), 0);
+}
+
+TEST_F(PhysicsNodeTest, OneWarningDoesNotHideAnother) {
+  scene_.physics.tear_stretch = 2.2f;
+  Bench bench(scene_, nullptr);
+  bench.Play(0, 4);
+  TopologyState other = WholeTopology(scene_);
+  other.scene_hash = scene_.hash + 1;
+  other.revision = 1;
+  bench.bus_.topology.MakeOutput()->Write(other);
+  bench.Play(4, 4.01);
+  Health health;
+  bench.node_.FillHealth(&health);
+  EXPECT_EQ(health.last_error.rfind("TopologyState or OpenCells of another scene refused; membrane near tearing", 0),
+            0u)
+      << health.last_error;
 }
 
 TEST_F(PhysicsRestart, GoesTheWayOfTheOutageAndDatesItsContactsByIt) {

@@ -66,6 +66,26 @@ TEST_F(SceneCacheTest, ABaseByNameIsAnInput) {
   EXPECT_EQ(Runs(), 2);
 }
 
+TEST_F(SceneCacheTest, MaterialsBesideTheSceneItsBasesAndTheShippedAreInputs) {
+  const fs::path own = folder_.path() / "own", base = folder_.path() / "base";
+  fs::create_directories(own);
+  fs::create_directories(base);
+  std::ofstream(base / "low.yaml") << "name: low\n";
+  std::ofstream(own / "mine.yaml") << "name: mine\nbase: ../base/low.yaml\n";
+  request_.name = (own / "mine.yaml").string();
+  (void)ResolveScene(request_);
+  const int first = Runs();
+  (void)ResolveScene(request_);
+  EXPECT_EQ(Runs(), first);
+  int added = 0;
+  for (const fs::path& folder : {own, base, request_.library.parent_path()}) {
+    fs::create_directories(folder / "materials");
+    std::ofstream(folder / "materials" / "gel.yaml") << "look: fat\n";
+    (void)ResolveScene(request_);
+    EXPECT_EQ(Runs(), first + ++added) << folder;
+  }
+}
+
 TEST_F(SceneCacheTest, CompiledFileIsTakenAsItIs) {
   std::ofstream(folder_.path() / "ready.fulcrum") << "x";
   request_.name = (folder_.path() / "ready.fulcrum").string();
