@@ -161,6 +161,7 @@ class PhysicsNode {
     std::atomic<std::uint32_t> torn_edges{0};
     std::atomic<std::uint32_t> limited{0};  ///< Bit per tool: the force on it was limited.
     std::atomic<TearWatch::Nearest> nearest_to_tearing{};
+    static_assert(decltype(nearest_to_tearing)::is_always_lock_free);
     std::atomic<float> largest_stretch{0};
     std::atomic<float> pace{1};                  ///< Simulated over passed time.
     std::atomic<std::uint64_t> lost_periods{0};  ///< That passed and were not simulated.

@@ -62,8 +62,9 @@ class TearWatch {
   /// Edges (3 * node + direction) that have torn since the start: bits as in TearState.
   [[nodiscard]] std::span<const std::uint8_t> torn() const { return torn_; }
   [[nodiscard]] std::uint32_t torn_count() const { return torn_count_; }
-  /// lambda where it is the greatest share of the limit of its sheet, at the last examination; and that limit.
-  struct Nearest {
+  /// lambda where it is the greatest share of the limit of its sheet, at the last examination; and that limit. Aligned
+  /// so that every compiler reads both at once where they are atomic.
+  struct alignas(2 * sizeof(float)) Nearest {
     float stretch = 0, limit = 0;
   };
   [[nodiscard]] Nearest nearest() const { return nearest_; }
