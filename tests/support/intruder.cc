@@ -8,6 +8,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <chrono>
 #include <ctime>
 #include <fstream>
@@ -55,7 +57,7 @@ std::string Tampered(const fs::path& keys) {
   return text.replace(text.find(was), was.size(), "fulcrum/ToolState");
 }
 
-/// A pipe that gives its first reader one document and the next reader another.
+/// A pipe that gives its first reader one document and the next reader another, and so on in turn.
 class TwoFacedPipe {
  public:
   TwoFacedPipe(fs::path path, std::string first, std::string second) : path_(std::move(path)) {
@@ -64,18 +66,27 @@ class TwoFacedPipe {
     thread_ = std::thread([this, texts = std::vector<std::string>{std::move(first), std::move(second)}] {
       const int watch = ::inotify_init1(IN_CLOEXEC);
       ::inotify_add_watch(watch, path_.c_str(), IN_CLOSE_NOWRITE);
-      for (const std::string& text : texts) {
+      for (std::size_t i = 0;; ++i) {
         const int fd = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC);
+        if (stopped_) {
+          ::close(fd);
+          break;
+        }
+        const std::string& text = texts[i % texts.size()];
         (void)!::write(fd, text.data(), text.size());
         ::close(fd);
-        // The first reader must have closed before the next text is written.
+        // One reader must have closed before the next text is written.
         pollfd closed{watch, POLLIN, 0};
-        (void)::poll(&closed, 1, kLongestRead_ms);
+        if (::poll(&closed, 1, kLongestRead_ms) > 0) {
+          std::array<char, 512> events{};
+          (void)!::read(watch, events.data(), events.size());
+        }
       }
       ::close(watch);
     });
   }
   ~TwoFacedPipe() {
+    stopped_ = true;
     // Unblocks the thread if there was no reader.
     const int fd = ::open(path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
     thread_.join();
@@ -86,6 +97,7 @@ class TwoFacedPipe {
 
  private:
   fs::path path_;
+  std::atomic<bool> stopped_ = false;
   std::thread thread_;
 };
 

@@ -23,7 +23,10 @@ namespace {
 constexpr int kHeard = 5;
 constexpr auto kLongest = std::chrono::seconds(12);
 // Or until the cart has reported it: SIGTERM ends it well.
-constexpr auto kForgedFor = std::chrono::seconds(25);
+constexpr auto kForgedFor = std::chrono::seconds(15);
+// Participants that a forger makes, one after the other: once in some fifteen runs on a busy machine the cart has not
+// met one within 25 s.
+constexpr int kForgers = 3;
 
 ToolState Forged() {
   ToolState state = bus::test::Sample<ToolState>();
@@ -61,7 +64,9 @@ int Run(int argc, char** argv) {
   std::signal(SIGTERM, [](int) { ::_exit(0); });
   std::vector<std::uint8_t> bytes;
   if (!bus::EncodeCdr(Forged(), &bytes)) return 1;
-  testing::WriteForgedTools(domain, argv[2], settings.security, argv[5], argv[6], bytes, kForgedFor);
+  for (int i = 0; i < kForgers; ++i) {
+    testing::WriteForgedTools(domain, argv[2], settings.security, argv[5], argv[6], bytes, kForgedFor);
+  }
   return 0;
 }
 
