@@ -8,6 +8,7 @@ namespace fulcrum {
 inline TopologyState WholeTopology(const SheetScene& scene) {
   TopologyState topology;
   const std::size_t nodes = scene.membrane.node_count();
+  topology.scene_hash = scene.hash;
   topology.rows = scene.membrane.rows;
   topology.cols = scene.membrane.cols;
   topology.dead_nodes.assign((nodes + 7) / 8, 0);

@@ -11,6 +11,7 @@
 #include "services/scene/builder/build.h"
 #include "tests/benchmark/physics/baselines/textbook_pbd.h"
 #include "tests/benchmark/report.h"
+#include "tests/support/whole_topology.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -217,13 +218,7 @@ void HoldError(SceneView scene, Report* report) {
 void Edit(const SceneView& scene, Report* report) {
   ParticleStore particles(scene);
   TissueModel model(scene, &particles);
-  TopologyState state;
-  const std::size_t nodes = scene.membrane.node_count();
-  state.rows = scene.membrane.rows;
-  state.cols = scene.membrane.cols;
-  state.dead_nodes.assign((nodes + 7) / 8, 0);
-  state.dead_edges.assign((3 * nodes + 7) / 8, 0);
-  state.shrink.assign(3 * nodes, 0);
+  TopologyState state = WholeTopology(scene);
   const double compare_us = 1e3 * Quantile(TimeMs(5, 200, [&] { (void)model.Apply(state, &particles); }), 0.5);
   // A cut along the middle column, ten edges a message.
   std::vector<double> per_edge_us;

@@ -6,6 +6,7 @@
 
 #include "render_node/geometry/membrane_mesh.h"
 #include "services/base/core/operator_script.h"
+#include "tests/support/whole_topology.h"
 
 namespace fulcrum::render {
 namespace {
@@ -68,12 +69,7 @@ bool Crosses(const Vec2f& a, const Vec2f& b, const std::vector<Vec2f>& path) {
 void Cut(const SceneView& scene, SyntheticMoment* moment) {
   const MembraneGrid& grid = scene.membrane;
   TopologyState& topology = moment->topology;
-  topology.scene_hash = scene.hash;
-  topology.rows = grid.rows;
-  topology.cols = grid.cols;
-  topology.dead_nodes.assign((grid.node_count() + 7) / 8, 0);
-  topology.dead_edges.assign((3 * std::size_t{grid.node_count()} + 7) / 8, 0);
-  topology.shrink.assign(3 * std::size_t{grid.node_count()}, 0);
+  topology = WholeTopology(scene);
   if (moment->cut_path.size() < 2) {
     return;
   }

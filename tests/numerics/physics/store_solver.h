@@ -6,17 +6,14 @@
 #include "physics_node/tissue/particle_store.h"
 #include "physics_node/tissue/tissue_model.h"
 #include "tests/numerics/physics/solver_under_test.h"
+#include "tests/support/whole_topology.h"
 
 namespace fulcrum::physics {
 
 class StoreSolver : public SolverUnderTest {
  public:
   explicit StoreSolver(const SceneView& scene) : scene_(scene), particles_(scene), tissue_(scene, &particles_) {
-    topology_.rows = scene.membrane.rows;
-    topology_.cols = scene.membrane.cols;
-    topology_.dead_nodes.assign((scene.membrane.node_count() + 7) / 8, 0);
-    topology_.dead_edges.assign((3 * scene.membrane.node_count() + 7) / 8, 0);
-    topology_.shrink.assign(3 * std::size_t{scene.membrane.node_count()}, 0);
+    topology_ = WholeTopology(scene);
   }
 
   void SetPositions(std::span<const float> xyz) override {

@@ -9,6 +9,7 @@
 #include "physics_node/implicit/implicit_solver.h"
 #include "physics_node/implicit/workers.h"
 #include "services/scene/builder/build.h"
+#include "tests/support/whole_topology.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -60,15 +61,9 @@ class Accurate : public testing::Test {
     }
     return held;
   }
-  TopologyState WholeTopology() const {
-    TopologyState topology;
-    const std::size_t nodes = scene_.membrane.node_count();
+  TopologyState FirstTopology() const {
+    TopologyState topology = WholeTopology(scene_);
     topology.revision = 1;
-    topology.rows = scene_.membrane.rows;
-    topology.cols = scene_.membrane.cols;
-    topology.dead_nodes.assign((nodes + 7) / 8, 0);
-    topology.dead_edges.assign((3 * nodes + 7) / 8, 0);
-    topology.shrink.assign(3 * nodes, 0);
     return topology;
   }
   void Release(Run* run) const {
@@ -94,7 +89,7 @@ TEST_F(Accurate, SameBitsOnEveryInstructionSetAndAnyNumberOfThreads) {
     const auto run = [&](const implicit::Kernels& kernels, int threads, bool cut) {
       Run result(scene_, kernels, threads);
       if (cut) {
-        TopologyState topology = WholeTopology();
+        TopologyState topology = FirstTopology();
         for (Index row = 20; row < 40; ++row) {
           SetBit(topology.dead_edges, 3 * (row * scene_.membrane.cols + scene_.membrane.cols / 2 + 3));
         }
@@ -204,7 +199,7 @@ TEST_F(Accurate, ContactAndCutsWake) {
   }
   ASSERT_TRUE(run.solver.regions().none_computed());
 
-  TopologyState topology = WholeTopology();
+  TopologyState topology = FirstTopology();
   SetBit(topology.dead_edges, 3 * (row_index * scene_.membrane.cols + col));
   ASSERT_GT(run.tissue.Apply(topology, &run.particles), 0);
   run.solver.UpdateTopology(run.tissue);
@@ -303,7 +298,7 @@ TEST_F(Accurate, PulledAndReleasedItComesBack) {
 
 TEST_F(Accurate, CutEdgesCarryNothing) {
   Run whole(scene_), cut(scene_);
-  TopologyState topology = WholeTopology();
+  TopologyState topology = FirstTopology();
   // Cuts around the held patch.
   const Index rows = scene_.membrane.rows, cols = scene_.membrane.cols;
   for (Index r = rows / 2 - 3; r <= rows / 2 + 3; ++r) {

@@ -184,16 +184,10 @@ TEST_F(PhysicsNodeTest, HoldsItsToolsWhenTheInputGoesStale) {
 
 TEST_F(PhysicsNodeTest, AppliesTopologyOfItsSceneOnly) {
   Bench bench(scene_, nullptr);
-  TopologyState state;
-  const std::size_t nodes = scene_.membrane.node_count();
+  TopologyState state = WholeTopology(scene_);
   state.stamp = {1, 1, 1};
   state.scene_hash = 78;
   state.revision = 5;
-  state.rows = scene_.membrane.rows;
-  state.cols = scene_.membrane.cols;
-  state.dead_nodes.assign((nodes + 7) / 8, 0);
-  state.dead_edges.assign((3 * nodes + 7) / 8, 0);
-  state.shrink.assign(3 * nodes, 0);
   SetBit(state.dead_nodes, 40 * 25 + 12);
   bench.topology_out_->Write(state);
   bench.Step();

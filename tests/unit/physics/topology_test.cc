@@ -6,22 +6,11 @@
 #include "physics_node/tissue/tissue_model.h"
 #include "services/base/core/error.h"
 #include "services/scene/builder/build.h"
+#include "tests/support/whole_topology.h"
 #include "tests/unit/physics/sheet_scene.h"
 
 namespace fulcrum::physics {
 namespace {
-
-TopologyState Untouched(const SceneView& scene) {
-  TopologyState state;
-  state.scene_hash = scene.hash;
-  state.rows = scene.membrane.rows;
-  state.cols = scene.membrane.cols;
-  const std::size_t nodes = scene.membrane.node_count();
-  state.dead_nodes.assign((nodes + 7) / 8, 0);
-  state.dead_edges.assign((3 * nodes + 7) / 8, 0);
-  state.shrink.assign(3 * nodes, 0);
-  return state;
-}
 
 class Topology : public testing::Test {
  protected:
@@ -29,7 +18,7 @@ class Topology : public testing::Test {
   SceneView scene_ = data_.View();
   ParticleStore particles_{scene_};
   TissueModel model_{scene_, &particles_};
-  TopologyState state_ = Untouched(scene_);
+  TopologyState state_ = WholeTopology(scene_);
 
   [[nodiscard]] float Rest(Index node, int direction) const {
     return model_.rest(direction)[particles_.layout().Offset(node / 17, node % 17)];

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "services/scene/builder/build.h"
+#include "tests/support/whole_topology.h"
 
 namespace fulcrum::render {
 namespace {
@@ -20,10 +21,7 @@ TemperaturePatch PatchAt(std::uint32_t x, std::uint32_t y, std::uint8_t value) {
 class AtlasTest : public testing::Test {
  protected:
   AtlasTest() : data_(scene::BuildProcedural(scene::Small())), view_(data_.View()), atlas_(view_) {
-    topology_.rows = view_.membrane.rows;
-    topology_.cols = view_.membrane.cols;
-    topology_.dead_nodes.assign((view_.membrane.node_count() + 7) / 8, 0);
-    topology_.dead_edges.assign((3 * view_.membrane.node_count() + 7) / 8, 0);
+    topology_ = WholeTopology(view_);
     for (std::uint32_t row = 30; row <= 40; ++row) {
       const std::size_t node = row * view_.membrane.cols + 8;
       SetBit(topology_.dead_edges, 3 * node);

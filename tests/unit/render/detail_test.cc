@@ -10,6 +10,7 @@
 #include "render_node/geometry/sheet_detail.h"
 #include "services/base/core/error.h"
 #include "services/scene/builder/build.h"
+#include "tests/support/whole_topology.h"
 
 namespace fulcrum::render {
 namespace {
@@ -112,11 +113,7 @@ TEST_F(DetailTest, TheSheetStaysWatertightWhereItsDetailVaries) {
 }
 
 TEST_F(DetailTest, ACutIsDrawnAsFinelyAsItIs) {
-  TopologyState topology;
-  topology.rows = view_.membrane.rows;
-  topology.cols = view_.membrane.cols;
-  topology.dead_nodes.assign((view_.membrane.node_count() + 7) / 8, 0);
-  topology.dead_edges.assign((3 * std::size_t{view_.membrane.node_count()} + 7) / 8, 0);
+  TopologyState topology = WholeTopology(view_);
   const Index node = view_.membrane.rows / 2 * view_.membrane.cols + view_.membrane.cols / 2;
   SetBit(topology.dead_edges, 3 * std::size_t{node});
   SetBit(topology.dead_edges, 3 * std::size_t{node} + 2);

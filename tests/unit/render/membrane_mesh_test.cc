@@ -17,10 +17,7 @@ namespace {
 class MembraneMeshTest : public testing::Test {
  protected:
   MembraneMeshTest() : data_(scene::BuildProcedural(scene::Small())), view_(data_.View()), mesh_(view_) {
-    topology_.rows = view_.membrane.rows;
-    topology_.cols = view_.membrane.cols;
-    topology_.dead_nodes.assign((view_.membrane.node_count() + 7) / 8, 0);
-    topology_.dead_edges.assign((3 * view_.membrane.node_count() + 7) / 8, 0);
+    topology_ = WholeTopology(view_);
   }
 
   Index Node(std::uint32_t row, std::uint32_t col) const { return row * view_.membrane.cols + col; }
