@@ -93,10 +93,11 @@ void CheckSheets(const SceneView& s) {
            kRowsBetweenSheets, " and not below ", least);
     }
     if (sheet.over != kNoIndex) CheckIndex("sheets", i, sheet.over, 0, SolidCount(s));
-    if (sheet.Et_N_per_m != 0.0f) CheckRange("sheets", "Et", i, sheet.Et_N_per_m, 9e-4, 1e7);
+    // 0: that of `physics`; else its bounds there, in the float of the file.
+    if (sheet.Et_N_per_m != 0.0f) CheckRange("sheets", "Et", i, sheet.Et_N_per_m, double{1e-3f}, 1e7);
     CheckRange("sheets", "bending", i, sheet.bending_Nm, 0, 1);
     if (sheet.fat_youngs_modulus_Pa != 0.0f) {
-      CheckRange("sheets", "fat_youngs_modulus", i, sheet.fat_youngs_modulus_Pa, 0.9, 1e9);
+      CheckRange("sheets", "fat_youngs_modulus", i, sheet.fat_youngs_modulus_Pa, 1, 1e9);
     }
     CheckRange("sheets", "tear_stretch", i, sheet.tear_stretch, 0, 10);
     if (sheet.tear_stretch != 0.0f && !(sheet.tear_stretch > 1.0f + s.physics.membrane_prestrain)) {
