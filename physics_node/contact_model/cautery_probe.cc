@@ -6,7 +6,7 @@
 //   r, t    radius of the metal, thickness of the sheet [m]          l_k  length of the piece on the sheet [m]
 //   g       kStrikeGap, in contact kHoldGap [m]
 //
-// Gap of a cell in the footprint: AddGaps.
+// Gap of a cell in the footprint: gap_box.h.
 #include "physics_node/contact_model/cautery_probe.h"
 
 #include <algorithm>
@@ -17,17 +17,8 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Gap between metal and sheet at which an arc strikes, and up to which it is sustained [m]. At the 500 V peak of a
-/// cutting generator air and steam break down across 0.05 to 0.15 mm (Paschen).
-constexpr float kStrikeGap = 1.0e-4f, kHoldGap = 2.5e-4f;
-/// Largest gap in the footprint [m]: the reach of discharges and sparks.
-constexpr float kFootprintReach = 7.0e-4f;
-/// Part of a gap along the normal that does not count [m]: tissue yields under the metal, and its surface is wet.
-constexpr float kContactSlack = 5.0e-5f;
 /// Least length of an edge of the mesh in the count of cells near the metal; bounds it [m].
 constexpr float kShortestEdge = 1.0e-4f;
-/// Length of bare metal on the neck [m].
-constexpr float kBareNeck = 0.005f;
 /// Distance of two stations along the metal [m]; larger where there would be more than kMaxStations.
 constexpr float kStationSpacing = 5.0e-4f;
 constexpr std::size_t kMaxStations = 24;
@@ -43,8 +34,6 @@ constexpr float kMaxFollowed = 0.008f;
 constexpr float kTentHeight = 0.002f;
 /// Largest distance in rows and columns of a binding that represents the movement of the organ below a point.
 constexpr int kBindingWindow = 6;
-/// Time constant of the rate of the contact in material coordinates [s].
-constexpr float kRateTime = 0.03f;
 /// Time constant of the movement of the contact's centre along the metal [s]: where flat metal touches most is noise.
 constexpr float kCentreTime = 0.15f;
 /// Squared distance of a station without living membrane near it [m^2]: 1 m, beyond kMaxFollowed.
@@ -220,15 +209,14 @@ bool CauteryProbe::FindCentre(float radius_m, float step_s, Vec2f* centre) {
   return true;
 }
 
-/// A triangle is divided into the parts that its dead edges leave; a cell belongs to the part whose own corners are
-/// nearest to it.
 void CauteryProbe::AddGaps(Index triangle, const MetalAxis& axis, float radius_m) {
   if (!HasTriangle(scene_, triangle)) return;
   const MembraneTriangle t = MembraneTriangleAt(scene_.membrane.cols, triangle);
   const SheetAccess held{scene_, *model_, *particles_};
   const SlitSheet sheet(held);
   const TriangleParts parts = sheet.Parts(t);
-  SheetTriangle piece;
+  const float cushion = 0.5f * scene_.thermal.thickness_m + kContactSlack;
+  SurfaceTriangle piece;
   for (std::size_t k = 0; k < 3; ++k) {
     piece.material[k] = scene_.membrane_material[t.nodes[k]];
   }
@@ -237,38 +225,13 @@ void CauteryProbe::AddGaps(Index triangle, const MetalAxis& axis, float radius_m
     for (std::size_t k = 0; k < 3; ++k) {
       piece.place[k] = walk_.NodePlace(t.nodes[k]);
     }
-    AddGaps(piece, axis, radius_m, [](const std::array<float, 3>&) { return true; });
+    gaps_.Add(piece, axis, radius_m, cushion, [](const std::array<float, 3>&) { return true; });
     return;
   }
   for (std::size_t i = 0; i < parts.count; ++i) {
     piece.place = sheet.Corners(t.nodes, parts.owned[i]);
-    AddGaps(piece, axis, radius_m, [&](const std::array<float, 3>& w) { return parts.IsOf(i, w); });
+    gaps_.Add(piece, axis, radius_m, cushion, [&](const std::array<float, 3>& w) { return parts.IsOf(i, w); });
   }
-}
-
-///   gap = sqrt(max(|o|^2 - h^2, 0) + max(|h| - t/2 - kContactSlack, 0)^2) - radius,   h = n . o
-///
-/// with the offset o from the cell to the axis, the normal n of the piece and the thickness t of the sheet [m].
-template <class Belongs>
-void CauteryProbe::AddGaps(const SheetTriangle& piece, const MetalAxis& axis, float radius_m, const Belongs& belongs) {
-  const auto& x = piece.place;
-  const Vec3f normal = (x[1] - x[0]).cross(x[2] - x[0]).normalized();
-  const float cushion = 0.5f * scene_.thermal.thickness_m + kContactSlack;
-  ForCellsIn(piece.material, scene_.thermal.cell_m, gap_x_, gap_y_, gap_x_ + kGapCells - 1, gap_y_ + kGapCells - 1,
-             [&](std::int32_t ix, std::int32_t iy, const std::array<float, 3>& w) {
-               if (!belongs(w)) {
-                 return;
-               }
-               const Vec3f p = w[0] * x[0] + w[1] * x[1] + w[2] * x[2];
-               float& gap = gap_m_[static_cast<std::size_t>((iy - gap_y_) * kGapCells + ix - gap_x_)];
-               for (std::size_t k = 1; k < axis.size(); ++k) {
-                 const Vec3f along = axis[k] - axis[k - 1];
-                 const Vec3f offset = axis[k - 1] + ClosestOnSegment(p, axis[k - 1], axis[k]) * along - p;
-                 const float height = normal.dot(offset), off = std::max(std::abs(height) - cushion, 0.0f);
-                 const float lateral_sq = std::max(offset.squaredNorm() - height * height, 0.0f);
-                 gap = std::min(gap, std::sqrt(lateral_sq + off * off) - radius_m);
-               }
-             });
 }
 
 /// Cells of the mesh near the metal: those around the places of the stations, and those of the contact pairs, which
@@ -304,38 +267,14 @@ void CauteryProbe::FindNearCells(float reach_m, const ToolCollision& collision) 
 
 void CauteryProbe::FillFootprint(const ToolPose& pose, const ToolDescription& tool, const ToolCollision& collision,
                                  const Vec2f& centre, Footprint* print) {
-  const float cell = scene_.thermal.cell_m;
-  gap_x_ = static_cast<std::int32_t>(std::floor(centre.x() / cell)) - kGapCells / 2;
-  gap_y_ = static_cast<std::int32_t>(std::floor(centre.y() / cell)) - kGapCells / 2;
-  gap_m_.fill(2 * kFootprintReach);
+  gaps_.Begin(centre, scene_.thermal.cell_m);
   const MetalAxis axis{pose.ToWorld(Vec3f(tool.tip_length_m, 0, 0)), pose.p_WT, pose.ToWorld(Vec3f(0, 0, -kBareNeck))};
   FindNearCells(tool.tip_radius_m + kFootprintReach, collision);
   for (const Index near : near_cells_) {
     AddGaps(2 * near, axis, tool.tip_radius_m);
     AddGaps(2 * near + 1, axis, tool.tip_radius_m);
   }
-  int left = kGapCells, right = -1, top = kGapCells, bottom = -1;
-  for (int j = 0; j < kGapCells; ++j) {
-    for (int i = 0; i < kGapCells; ++i) {
-      if (gap_m_[static_cast<std::size_t>(j * kGapCells + i)] < kFootprintReach) {
-        left = std::min(left, i);
-        right = std::max(right, i);
-        top = std::min(top, j);
-        bottom = j;
-      }
-    }
-  }
-  if (right < 0) {
-    return;
-  }
-  print->x = gap_x_ + left;
-  print->y = gap_y_ + top;
-  print->width = static_cast<std::uint32_t>(right - left + 1);
-  for (int j = top; j <= bottom; ++j) {
-    for (int i = left; i <= right; ++i) {
-      print->gap.push_back(Footprint::Encode(gap_m_[static_cast<std::size_t>(j * kGapCells + i)]));
-    }
-  }
+  gaps_.Encode(print);
 }
 
 CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision,

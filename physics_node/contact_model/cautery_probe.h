@@ -7,6 +7,7 @@
 
 #include "physics_node/collision/open_cells.h"
 #include "physics_node/collision/tool_collision.h"
+#include "physics_node/contact_model/gap_box.h"
 #include "physics_node/contact_model/sheet_place.h"
 #include "services/base/core/slit_sheet.h"
 
@@ -57,15 +58,13 @@ class CauteryProbe {
   /// Mean place of the metal within the gap that conducts, weighted by (limit - distance)^2 and by the
   /// length that it covers. False: there is none.
   bool FindCentre(float radius_m, float step_s, Vec2f* centre);
-  /// End of the foot, heel, end of the bare neck, in frame W.
-  using MetalAxis = std::array<Vec3f, 3>;
   /// Gaps of the cells around `centre` from the metal.
   void FillFootprint(const ToolPose& pose, const ToolDescription& tool, const ToolCollision& collision,
                      const Vec2f& centre, Footprint* print);
   void FindNearCells(float reach_m, const ToolCollision& collision);
+  /// A triangle is divided into the parts that its dead edges leave; a cell belongs to the part whose own corners are
+  /// nearest to it.
   void AddGaps(Index triangle, const MetalAxis& axis, float radius_m);
-  template <class Belongs>
-  void AddGaps(const SheetTriangle& piece, const MetalAxis& axis, float radius_m, const Belongs& belongs);
   [[nodiscard]] bool Tented(Index triangle, const std::array<float, 3>& barycentric) const;
 
   TissueScene scene_;
@@ -73,9 +72,7 @@ class CauteryProbe {
   const ParticleStore* particles_;
   SheetWalk walk_;
   std::vector<Station> stations_;
-  static constexpr int kGapCells = static_cast<int>(kFootprintCells);
-  std::array<float, std::size_t{kGapCells} * kGapCells> gap_m_{};  ///< Row by row.
-  std::int32_t gap_x_ = 0, gap_y_ = 0;                             ///< Cell of the first.
+  GapBox gaps_;
   std::vector<Index> near_cells_;
   float spacing_ = 0;      ///< Longest edge of the membrane at rest [m].
   bool followed_ = false;  ///< The stations have places on the sheet.

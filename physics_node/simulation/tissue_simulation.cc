@@ -42,6 +42,9 @@ TissueSimulation::TissueSimulation(const TissueScene& scene, int threads, Instru
       contacts_(scene, &model_, &particles_),
       cautery_(scene, &model_, &particles_),
       tears_(scene, &model_, &particles_) {
+  if (SolidsBurn(scene)) {
+    solid_probe_.emplace(scene, &particles_);
+  }
   if (Printed(scene)) {
     printed_.emplace(scene, &model_, &particles_);
   }
@@ -335,7 +338,13 @@ DeviceContacts TissueSimulation::Contacts(std::uint32_t tool) {
 }
 
 CauteryContact TissueSimulation::Cautery(std::uint32_t tool) {
-  return cautery_.Update(tool, tracks_[tool].now, collision_, step_s());
+  CauteryContact contact = cautery_.Update(tool, tracks_[tool].now, collision_, step_s());
+  if (solid_probe_ && contact.touching) {
+    solid_probe_->Leave();
+  } else if (solid_probe_) {
+    solid_probe_->Update(tool, tracks_[tool].now, collision_, step_s(), &contact);
+  }
+  return contact;
 }
 
 /// body(part, worker) for each of ParticleStore::kParts, on the threads of the solver if it has any.

@@ -12,6 +12,7 @@
 #include "physics_node/collision/tool_collision.h"
 #include "physics_node/contact_model/cautery_probe.h"
 #include "physics_node/contact_model/contact_probe.h"
+#include "physics_node/contact_model/solid_probe.h"
 #include "physics_node/grasp/grasp.h"
 #include "physics_node/implicit/implicit_solver.h"
 #include "physics_node/pbd/pbd_solver.h"
@@ -191,6 +192,7 @@ class TissueSimulation {
   ContactProbe contacts_;
   ImplicitCompliance implicit_compliance_{this};
   CauteryProbe cautery_;
+  std::optional<SolidProbe> solid_probe_;  ///< Of scenes whose solids are burnt.
   TearWatch tears_;
   std::array<ToolTrack, kMaxTools> tracks_;
   struct Sleep {

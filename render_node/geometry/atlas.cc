@@ -69,8 +69,8 @@ Atlas::Atlas(const SceneView& scene) : texel_m_(scene.membrane.texel_m) {
 }
 
 AtlasRect Atlas::Apply(const TemperaturePatch& patch) {
-  if (patch.texels.size() != 4u * kPatchTexels * kPatchTexels || patch.header.origin_x >= kAtlasTexels ||
-      patch.header.origin_y >= kAtlasTexels) {
+  if (patch.header.surface != BurntSurface::kMembrane || patch.texels.size() != 4u * kPatchTexels * kPatchTexels ||
+      patch.header.origin_x >= kAtlasTexels || patch.header.origin_y >= kAtlasTexels) {
     return {};
   }
   const int x = static_cast<int>(patch.header.origin_x), y = static_cast<int>(patch.header.origin_y);

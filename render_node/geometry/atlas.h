@@ -25,8 +25,8 @@ class Atlas {
   /// Covers the material coordinates of `scene`; intact tissue at body temperature everywhere.
   explicit Atlas(const SceneView& scene);
 
-  /// Copies the part of the patch that lies within the atlas. Returns the changed rectangle; empty if the patch has the
-  /// wrong size or lies outside.
+  /// Copies the part of the patch that lies within the atlas. Returns the changed rectangle; empty if the patch is of
+  /// another surface, has the wrong size or lies outside.
   AtlasRect Apply(const TemperaturePatch& patch);
 
   /// Draws slits from the topology where no patch has arrived yet, as after a restart of the renderer. Each cut

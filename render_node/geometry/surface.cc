@@ -152,7 +152,7 @@ SurfacePoint NearestOnSurface::Find(const Vec3f& point) const {
               best_distance = d;
               // The factor allows for rounding of roots and radii.
               best_root = 1.001f * std::sqrt(d);
-              best = {t, w};
+              best = {t, w, order_[k]};
             }
           }
         }

@@ -26,6 +26,7 @@ void ComputeNormals(std::span<const Vec3f> positions, std::span<const Triangle> 
 struct SurfacePoint {
   Triangle triangle;
   std::array<float, 3> barycentric;
+  Index number = kNoIndex;  ///< Of the triangle, among those that were searched.
   [[nodiscard]] Vec3f At(std::span<const float> xyz) const {
     return barycentric[0] * PositionOf(xyz, triangle[0]) + barycentric[1] * PositionOf(xyz, triangle[1]) +
            barycentric[2] * PositionOf(xyz, triangle[2]);

@@ -166,7 +166,7 @@ void RenderNode::PassOver() {
   (void)ports_.handles.TakeLatest(&new_handles_);
   (void)ports_.contacts.TakeLatest(&contact_);
   (void)ports_.contact_models.TakeLatest(&contact_model_);
-  while (ports_.patches.TakeNext(&patch_)) held_patches_[{patch_.header.origin_x, patch_.header.origin_y}] = patch_;
+  while (ports_.patches.TakeNext(&patch_)) held_patches_[PlaceOf(patch_.header)] = patch_;
 }
 
 void RenderNode::TakeThermal() {
@@ -269,8 +269,10 @@ void RenderNode::TakeContact() {
     return;
   }
   // Events report the first steam at a place only; steam continues while power is delivered to boiling tissue.
-  if (contact_.touching && hud_.power_W > 0 && temperature_C_ > kBoils_C && Recent(temperature_time_s_)) {
-    view_.AddSmoke(contact_.material, session_time_s_);
+  const bool boils = hud_.power_W > 0 && temperature_C_ > kBoils_C && Recent(temperature_time_s_);
+  if (boils && (contact_.touching || contact_.on_solid)) {
+    const Vec3f p_W = contact_.on_solid ? tools_.tools[contact_.tool].p_WT : view_.OnMembrane(contact_.material);
+    view_.AddSmokeAt(p_W, session_time_s_);
     changed_on_screen_ = changed_in_file_ = true;
   }
 }
@@ -390,7 +392,7 @@ void RenderNode::TakeTools() {
       }
     }
   }
-  lens_.Step(session_time_s_, tools_, contact_.touching && hud_.power_W > 0);
+  lens_.Step(session_time_s_, tools_, (contact_.touching || contact_.on_solid) && hud_.power_W > 0);
   if (std::abs(lens_.soil() - hud_.soil) > kSameSoil || (lens_.soil() == 0 && hud_.soil != 0)) {
     hud_.soil = lens_.soil();
     view_.SetSoil(hud_.soil);

@@ -9,7 +9,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
-#include <utility>
+#include <tuple>
 
 #include "render_node/geometry/camera_control.h"
 #include "render_node/geometry/quality.h"
@@ -130,6 +130,11 @@ class RenderNode {
   void NoteLatency(double draw_ms);
   void Report(const std::string& error);
 
+  using PatchPlace = std::tuple<BurntSurface, std::uint32_t, std::uint32_t>;  // And origin in its atlas.
+  [[nodiscard]] static PatchPlace PlaceOf(const TemperaturePatchHeader& header) {
+    return {header.surface, header.origin_x, header.origin_y};
+  }
+
   SceneView scene_;
   bool window_;
   RenderPorts ports_;
@@ -148,7 +153,7 @@ class RenderNode {
   TissueFrame tissue_, new_tissue_;
   TopologyState topology_;
   TemperaturePatch patch_;
-  std::map<std::pair<std::uint32_t, std::uint32_t>, TemperaturePatch> held_patches_;  // During a pause, by origin.
+  std::map<PatchPlace, TemperaturePatch> held_patches_;  // During a pause.
   ToolState tools_, new_tools_;
   HandleState handles_, new_handles_;
   ThermalEvent event_;

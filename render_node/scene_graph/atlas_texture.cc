@@ -3,18 +3,20 @@
 #include <cstring>
 #include <osg/Image>
 
+#include "render_node/geometry/texel.h"
+
 namespace fulcrum::render {
 
 class AtlasTexture::Upload : public osg::Texture2D::SubloadCallback {
  public:
-  explicit Upload(const Atlas& atlas) : atlas_(atlas) {}
+  Upload(int width, int height, std::span<const std::uint8_t> texels)
+      : width_(width), height_(height), texels_(texels) {}
 
   void Add(const AtlasRect& rect) { pending_.push_back(rect); }
 
   void load(const osg::Texture2D&, osg::State&) const override {
     glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, atlas_.width(), atlas_.height(), 0, GL_RGBA, GL_UNSIGNED_BYTE,
-                 atlas_.texels().data());
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, width_, height_, 0, GL_RGBA, GL_UNSIGNED_BYTE, texels_.data());
     pending_.clear();
   }
 
@@ -23,24 +25,25 @@ class AtlasTexture::Upload : public osg::Texture2D::SubloadCallback {
       return;
     }
     glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-    glPixelStorei(GL_UNPACK_ROW_LENGTH, atlas_.width());
+    glPixelStorei(GL_UNPACK_ROW_LENGTH, width_);
     for (const AtlasRect& r : pending_) {
-      const std::size_t first = 4 * (static_cast<std::size_t>(r.y) * atlas_.width() + static_cast<std::size_t>(r.x));
       glTexSubImage2D(GL_TEXTURE_2D, 0, r.x, r.y, r.width, r.height, GL_RGBA, GL_UNSIGNED_BYTE,
-                      atlas_.texels().data() + first);
+                      texels_.data() + 4 * TexelIndex(r.x, r.y, width_));
     }
     glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
     pending_.clear();
   }
 
  private:
-  const Atlas& atlas_;
+  int width_, height_;
+  std::span<const std::uint8_t> texels_;
   // OSG calls load and subload as const; drawing and updating share one thread.
   mutable std::vector<AtlasRect> pending_;
 };
 
-AtlasTexture::AtlasTexture(const Atlas& atlas) : texture_(new osg::Texture2D), upload_(new Upload(atlas)) {
-  texture_->setTextureSize(atlas.width(), atlas.height());
+AtlasTexture::AtlasTexture(int width, int height, std::span<const std::uint8_t> texels)
+    : texture_(new osg::Texture2D), upload_(new Upload(width, height, texels)) {
+  texture_->setTextureSize(width, height);
   texture_->setInternalFormat(GL_RGBA8);
   texture_->setFilter(osg::Texture::MIN_FILTER, osg::Texture::LINEAR);
   texture_->setFilter(osg::Texture::MAG_FILTER, osg::Texture::LINEAR);

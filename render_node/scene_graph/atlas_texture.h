@@ -1,7 +1,9 @@
-// The atlas on the GPU: uploaded completely once, then only changed texels (glTexSubImage2D).
+// An atlas on the GPU: uploaded completely once, then only changed texels (glTexSubImage2D).
 #pragma once
 
+#include <cstdint>
 #include <osg/Texture2D>
+#include <span>
 #include <vector>
 
 #include "render_node/geometry/atlas.h"
@@ -10,8 +12,10 @@ namespace fulcrum::render {
 
 class AtlasTexture {
  public:
-  /// Keeps a reference to `atlas`.
-  explicit AtlasTexture(const Atlas& atlas);
+  /// Keeps a reference to `texels`: 4 * width * height bytes, row by row.
+  AtlasTexture(int width, int height, std::span<const std::uint8_t> texels);
+  /// Keeps a reference to the texels of `atlas`.
+  explicit AtlasTexture(const Atlas& atlas) : AtlasTexture(atlas.width(), atlas.height(), atlas.texels()) {}
   ~AtlasTexture();
   AtlasTexture(const AtlasTexture&) = delete;
   AtlasTexture& operator=(const AtlasTexture&) = delete;

@@ -224,10 +224,12 @@ bool LaparoscopeView::SetTopology(const TopologyState& topology) {
 }
 
 bool LaparoscopeView::ApplyPatch(const TemperaturePatch& patch) {
-  const AtlasRect rect = impl_->atlas.Apply(patch);
-  impl_->atlas_texture.Update(rect);
-  if (rect.empty()) {
-    return false;
+  if (patch.header.surface == BurntSurface::kSolids) {
+    if (!impl_->layers.Burn(patch)) return false;
+  } else {
+    const AtlasRect rect = impl_->atlas.Apply(patch);
+    if (rect.empty()) return false;
+    impl_->atlas_texture.Update(rect);
   }
   impl_->optics.SceneChanged();
   return true;
@@ -289,7 +291,14 @@ void LaparoscopeView::Update() {
 void LaparoscopeView::SetTexts(std::span<const OverlayText> texts) { impl_->overlay.Set(texts); }
 
 void LaparoscopeView::AddSmoke(const Vec2f& material, double session_time_s) {
-  impl_->smoke.Add(OnMembrane(material), session_time_s);
+  AddSmokeAt(OnMembrane(material), session_time_s);
+}
+
+void LaparoscopeView::AddSmokeAt(const Vec3f& p_W, double session_time_s) { impl_->smoke.Add(p_W, session_time_s); }
+
+void LaparoscopeView::RehearseBurn(bool on) {
+  impl_->layers.RehearseBurn(on);
+  impl_->optics.SceneChanged();
 }
 
 void LaparoscopeView::OpenVessels(const Vec2f& material, double session_time_s) {

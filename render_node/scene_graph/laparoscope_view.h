@@ -27,7 +27,7 @@ class LaparoscopeView {
   bool SetBreath(double simulated_time_s);
   /// Returns false, and changes nothing, if the topology belongs to another grid.
   bool SetTopology(const TopologyState& topology);
-  /// Returns false if the patch lies outside the sheet or has the wrong size.
+  /// Of the sheet or of the solids. Returns false if the patch lies outside their atlas or has the wrong size.
   bool ApplyPatch(const TemperaturePatch& patch);
   void SetTool(int tool, const ToolSample& sample);
   void SetJaw(int tool, float angle_rad);
@@ -36,8 +36,12 @@ class LaparoscopeView {
   void SetTexts(std::span<const OverlayText> texts);
   /// Adds a puff of steam at the present position of the sheet's point (s, t) [m].
   void AddSmoke(const Vec2f& material, double session_time_s);
+  /// The same at a place in frame W [m].
+  void AddSmokeAt(const Vec3f& p_W, double session_time_s);
   /// Opens the vessels at a cut at (s, t) [m]; they bleed until heat closes them.
   void OpenVessels(const Vec2f& material, double session_time_s);
+  /// Adds a piece of burnt tissue to the picture, or removes it: its shader is compiled when it is drawn.
+  void RehearseBurn(bool on);
   /// Advances smoke and blood. Returns true if the picture changes or will change by that, but for the haze.
   bool UpdateEffects(double session_time_s);
   /// True if the haze of smoke is no longer that of the last UpdateEffects.

@@ -7,10 +7,11 @@ namespace fulcrum::render {
 
 /// Opaque parts first, near to far, so that hidden fragments are not shaded; then translucent layers, from the inside
 /// out.
-enum class Order { kBackground, kMask, kInstruments, kRectum, kSurroundings, kFat, kMembrane, kShadow, kSmoke };
+enum class Order { kBackground, kMask, kInstruments, kRectum, kSurroundings, kBurn, kFat, kMembrane, kShadow, kSmoke };
 
-/// Texture units; the samplers of all programs are bound once at the scene's root.
-enum TextureUnit { kAtlasUnit, kNoiseUnit, kSerosaUnit, kStructureUnit };
+/// Texture units; the samplers of all programs are bound once at the scene's root, but for the burns of solids, which
+/// most sessions do not have.
+enum TextureUnit { kAtlasUnit, kNoiseUnit, kSerosaUnit, kStructureUnit, kBurnUnit };
 
 inline void DrawIn(Order order, osg::StateSet* state) {
   state->setRenderBinDetails(static_cast<int>(order), "RenderBin");

@@ -19,7 +19,7 @@ constexpr std::uint32_t kFatStride = 2;
 // Layers of tissue in contact overlap by up to a millimetre in the simulation; in the depth test the inner one counts
 // as this much farther away.
 constexpr float kFatBehind = 0.0015f;        // [m]
-constexpr float kRectumBehind = 0.0025f;     // [m]
+constexpr float kRectumBehind = 0.0025f;     // [m] kBurnBehind of burn_layer.cc is a little less.
 constexpr std::size_t kMostLinePoints = 64;  // As in membrane.frag.
 // [m] Margin of the box around a planned line outside which the shader skips the line.
 constexpr float kInkReach = 0.001f;
@@ -67,7 +67,8 @@ TissueLayers::TissueLayers(const SceneView& scene, const Laparoscope& scope)
       membrane_(scene),
       detail_(scene.membrane),
       fat_(scene, kFatStride),
-      rim_(SheetRim(scene)) {
+      rim_(SheetRim(scene)),
+      burn_(scene) {
   xyz_.resize(3 * scene.rest_position.size());
   for (std::size_t i = 0; i < scene.rest_position.size(); ++i) {
     Eigen::Map<Vec3f>(xyz_.data() + 3 * i) = scene.rest_position[i];
@@ -76,9 +77,9 @@ TissueLayers::TissueLayers(const SceneView& scene, const Laparoscope& scope)
   AddSheets();
 }
 
-void TissueLayers::Add(Layer* layer, const char* name, Order order, const char* fragment, const char* defined) {
+void TissueLayers::Add(Layer* layer, const char* name, Order order, osg::Program* program) {
   layer->mesh = std::make_unique<Mesh>(name, true);
-  layer->mesh->state()->setAttributeAndModes(MakeProgram("surface.vert", fragment, defined));
+  layer->mesh->state()->setAttributeAndModes(program);
   DrawIn(order, layer->mesh->state());
   geode_->addDrawable(layer->mesh->geometry());
 }
@@ -87,17 +88,18 @@ void TissueLayers::AddSolids() {
   solid_positions_.resize(scene_.surface_vertices.size());
   solid_normals_.resize(scene_.surface_vertices.size());
   UpdateSolids();
+  solid_program_ = MakeProgram("surface.vert", "rectum.frag");
   if (!scene_.solids.empty()) {
-    for (const Solid& solid : scene_.solids) AddSolid(solid);
+    for (const fulcrum::Solid& solid : scene_.solids) AddSolid(solid);
     return;
   }
-  Solid whole{};
+  fulcrum::Solid whole{};
   whole.surface_vertex_count = static_cast<Index>(scene_.surface_vertices.size());
   whole.surface_triangle_count = static_cast<Index>(scene_.surface_triangles.size());
   AddSolid(whole);
 }
 
-void TissueLayers::AddSolid(const Solid& solid) {
+void TissueLayers::AddSolid(const fulcrum::Solid& solid) {
   const std::span<const Vec3f> positions =
       std::span(solid_positions_).subspan(solid.first_surface_vertex, solid.surface_vertex_count);
   const std::span<const Vec3f> normals =
@@ -126,7 +128,7 @@ void TissueLayers::AddSolid(const Solid& solid) {
        scene_.surface_triangles.subspan(solid.first_surface_triangle, solid.surface_triangle_count)) {
     added.triangles.push_back({t[0] - added.first_vertex, t[1] - added.first_vertex, t[2] - added.first_vertex});
   }
-  Add(&added.layer, solid.look == SolidLook::kBowel ? "rectum" : "organ", Order::kRectum, "rectum.frag");
+  Add(&added.layer, solid.look == SolidLook::kBowel ? "rectum" : "organ", Order::kRectum, solid_program_);
   osg::StateSet* state = added.layer.mesh->state();
   state->setAttributeAndModes(new osg::CullFace(osg::CullFace::BACK));
   state->addUniform(new osg::Uniform("behind", kRectumBehind));
@@ -135,11 +137,11 @@ void TissueLayers::AddSolid(const Solid& solid) {
 }
 
 void TissueLayers::AddSheets() {
-  Add(&fat_layer_, "fat", Order::kFat, "fat.frag");
+  Add(&fat_layer_, "fat", Order::kFat, MakeProgram("surface.vert", "fat.frag"));
   Blend(fat_layer_.mesh->state());
   fat_layer_.mesh->state()->addUniform(new osg::Uniform("behind", kFatBehind));
   const bool printed = scene_.thermal.model == ThermalModel::kPaper && scene_.thermal.as == PaperForm::kPrinted;
-  Add(&sheet_, "membrane", Order::kMembrane, "membrane.frag", printed ? "AS_PRINTED" : "");
+  Add(&sheet_, "membrane", Order::kMembrane, MakeProgram("surface.vert", "membrane.frag", printed ? "AS_PRINTED" : ""));
   Blend(sheet_.mesh->state());
   sheet_.mesh->state()->addUniform(new osg::Uniform("fascia_depth", kFasciaDepth));
   const auto around = SurroundingColour(SurfaceRole::kRetroperitoneum);
@@ -214,8 +216,21 @@ void TissueLayers::ShowFat(const std::function<bool(const Vec2f& material, float
   topology_changed_ = true;
 }
 
+void TissueLayers::RehearseBurn(bool on) {
+  if (!on) {
+    burn_.EndRehearsal(geode_);
+    return;
+  }
+  // A piece of a centimetre, twice as near as what the scope looks at.
+  constexpr float kHalf_m = 0.005f;
+  const Vec3f middle = 0.5f * (eye_W_ + scene_.render.scope_target_W);
+  const Vec3f normal = (eye_W_ - middle).normalized();
+  const Vec3f u = kHalf_m * normal.unitOrthogonal(), v = normal.cross(u);
+  burn_.Rehearse({middle - u - v, middle + u - v, middle + v}, normal, geode_);
+}
+
 bool TissueLayers::Update() {
-  if (!tissue_changed_ && !topology_changed_ && !scope_changed_) {
+  if (!tissue_changed_ && !topology_changed_ && !scope_changed_ && !burn_.grown()) {
     return false;
   }
   UpdateMembrane();
@@ -231,6 +246,7 @@ bool TissueLayers::Update() {
       Show(&solid.layer, own(solid_positions_), solid.triangles, Sides::kFront);
     }
   }
+  burn_.Update(solid_positions_, solid_normals_, &field_);
   tissue_changed_ = topology_changed_ = scope_changed_ = false;
   return true;
 }

@@ -1,10 +1,11 @@
-// The deformable layers of tissue: organ, fat, membrane. Their meshes follow the particles; only visible triangles are
-// passed to OpenGL.
+// The deformable layers of tissue: organ with its burns, fat, membrane. Their meshes follow the particles; only visible
+// triangles are passed to OpenGL.
 #pragma once
 
 #include <functional>
 #include <memory>
 #include <osg/Geode>
+#include <osg/Program>
 #include <span>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "render_node/geometry/membrane_mesh.h"
 #include "render_node/geometry/sheet_detail.h"
 #include "render_node/geometry/sheet_rim.h"
+#include "render_node/scene_graph/burn_layer.h"
 #include "render_node/scene_graph/mesh.h"
 #include "render_node/scene_graph/order.h"
 
@@ -27,6 +29,8 @@ class TissueLayers {
   void SetTissue(std::span<const float> xyz);
   /// Returns false, and changes nothing, if the topology belongs to another grid.
   bool SetTopology(const TopologyState& topology);
+  /// Applies a patch of the solids. Returns false if it is of the membrane, lies outside or has the wrong size.
+  bool Burn(const TemperaturePatch& patch) { return burn_.Apply(patch, geode_); }
   void SetScope(const Laparoscope& scope);
   /// Draws the membrane in so many triangles as a picture with `factor` times as many lines needs; 1 at first.
   void SetDetail(float factor);
@@ -34,6 +38,8 @@ class TissueLayers {
   /// or is bared because the sheet above is `opened`.
   void ShowFat(const std::function<bool(const Vec2f& material, float thickness)>& visible,
                const std::function<bool(const Vec2f& material)>& opened);
+  /// Adds a piece of burnt tissue in front of everything, or removes it: see BurnLayer::Rehearse.
+  void RehearseBurn(bool on);
   /// Updates the meshes. Returns false if nothing has changed.
   bool Update();
 
@@ -47,7 +53,7 @@ class TissueLayers {
     std::unique_ptr<Mesh> mesh;
     std::vector<Triangle> seen;
   };
-  void Add(Layer* layer, const char* name, Order order, const char* fragment, const char* defined = "");
+  void Add(Layer* layer, const char* name, Order order, osg::Program* program);
   void Show(Layer* layer, std::span<const Vec3f> positions, std::span<const Triangle> triangles, Sides sides);
   /// The visible surface of a solid.
   struct SolidLayer {
@@ -56,7 +62,7 @@ class TissueLayers {
     std::vector<Triangle> triangles;  ///< Of its own vertices.
   };
   void AddSolids();
-  void AddSolid(const Solid& solid);
+  void AddSolid(const fulcrum::Solid& solid);  // Not the one of geometry/solid.h.
   void AddSheets();
   /// Adds the planned line of an exercise to the membrane.
   void AddPlannedLine();
@@ -80,7 +86,9 @@ class TissueLayers {
   const std::vector<float> rim_;  // Per node of the membrane's grid (geometry/sheet_rim.h).
   bool tissue_changed_ = true, topology_changed_ = true, scope_changed_ = true;
   osg::ref_ptr<osg::Geode> geode_ = new osg::Geode;
+  osg::ref_ptr<osg::Program> solid_program_;  ///< Of all solids: the rasteriser compiles each program.
   std::vector<SolidLayer> solids_;
+  BurnLayer burn_;
   Layer fat_layer_, sheet_;
 };
 

@@ -1,12 +1,12 @@
 // Checkpoint layout of the thermal solver: a header, the potential's start value, the cut's centre line and tool path,
-// protected structures, topology, then every tile that is not blank, each with only those arrays that differ from their
-// defaults, then the bricks of the volume with the rows that differ from 0.
+// protected structures, topology, then every tile that is not blank (checkpoint_bytes.h), then the bricks of the volume
+// with the rows that differ from 0. That of the solids' surface: a record, the potential's start value, tiles.
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <type_traits>
 #include <utility>
 
+#include "thermal_node/coupling/checkpoint_bytes.h"
+#include "thermal_node/coupling/solid_surface.h"
 #include "thermal_node/coupling/thermal_solver.h"
 
 namespace fulcrum::thermal {
@@ -14,86 +14,26 @@ namespace fulcrum::thermal {
 namespace {
 
 /// Identifies the layout; must change with it.
-constexpr std::uint64_t kLayout = 0x7468726d'00000007ull;
+constexpr std::uint64_t kLayout = 0x7468726d'00000008ull;
+constexpr std::uint64_t kSolidLayout = 0x736f6c69'00000001ull;
 /// A checkpoint of one model cannot be restored by another, so the model is part of the layout.
 constexpr std::uint64_t LayoutOf(ThermalModel model) { return kLayout + (static_cast<std::uint64_t>(model) << 16); }
 /// Bytes for tiles: about 1100 with all their arrays, enough for half a metre of cut; a checkpoint that needs
 /// more is not written and Health reports it.
 constexpr std::size_t kTileCapacity = std::size_t{24} << 20;
+/// Bytes for tiles of the solids' surface: about 380 with all their arrays, 150 square centimetres.
+constexpr std::size_t kSolidTileCapacity = std::size_t{8} << 20;
 /// Bytes for the centre line of three metres of cut and for the tool path.
 constexpr std::size_t kCutCapacity =
     (std::size_t{1} << 15) * sizeof(CellIndex) + kPathCapacity * sizeof(ToolPath::Point);
 /// Bytes for bricks: about thirty that are damaged down to the bottom.
 constexpr std::size_t kVolumeCapacity = std::size_t{32} << 20;
 
-class Writer {
- public:
-  explicit Writer(std::span<std::byte> out) : out_(out) {}
-  template <class T>
-  void Put(std::span<const T> values) {
-    static_assert(std::is_trivially_copyable_v<T>);
-    const std::span<const std::byte> bytes = std::as_bytes(values);
-    if (at_ + bytes.size() > out_.size()) full_ = true;
-    if (full_) return;
-    std::copy(bytes.begin(), bytes.end(), out_.begin() + static_cast<std::ptrdiff_t>(at_));
-    at_ += bytes.size();
-  }
-  template <class T>
-  void PutValue(const T& value) {
-    Put(std::span<const T>(&value, 1));
-  }
-  [[nodiscard]] std::size_t used() const { return full_ ? 0 : at_; }
-
- private:
-  std::span<std::byte> out_;
-  std::size_t at_ = 0;
-  bool full_ = false;
-};
-
-class Reader {
- public:
-  explicit Reader(std::span<const std::byte> in) : in_(in) {}
-  template <class T>
-  bool Get(std::span<T> values) {
-    const std::size_t bytes = values.size_bytes();
-    if (at_ + bytes > in_.size()) return false;
-    if (bytes > 0) std::memcpy(values.data(), in_.data() + at_, bytes);
-    at_ += bytes;
-    return true;
-  }
-  template <class T>
-  bool GetValue(T* value) {
-    return Get(std::span<T>(value, 1));
-  }
-  [[nodiscard]] bool at_end() const { return at_ == in_.size(); }
-
- private:
-  std::span<const std::byte> in_;
-  std::size_t at_ = 0;
-};
-
-auto FloatArrays(auto& s) { return std::array{&s.enthalpy, &s.water, &s.omega_cell, &s.omega_collagen, &s.charred}; }
-
-template <class Values>
-bool AllWithin(const Values& values, float low, float high) {
-  return std::all_of(values.begin(), values.end(), [&](float v) { return v >= low && v <= high; });  // false for NaN
-}
-
-/// Accepts only values that the solver can have written into a tile.
-bool Plausible(const TileState& s, int index, const HeatField& field) {
-  if (!AllWithin(s.water, 0.0f, 1.0f) || !AllWithin(s.omega_cell, 0.0f, kOmegaMax) ||
-      !AllWithin(s.omega_collagen, 0.0f, kOmegaMax) || !AllWithin(s.charred, 0.0f, 1.0f)) {
-    return false;
-  }
-  const Sheet& sheet = field.sheet();
-  const int x0 = index % sheet.tiles_x * kTile, y0 = index / sheet.tiles_x * kTile;
-  for (int k = 0; k < kTileCells; ++k) {
-    const bool outside = (s.flags[k] & kOutside) != 0;
-    if (outside != sheet.IsOutside(x0 + k % kTile, y0 + k / kTile)) return false;
-    const float limit = kThetaPlausible * field.material().HeatCapacity(s.water[k]);
-    if (!(std::abs(s.enthalpy[k]) <= limit)) return false;
-  }
-  return true;
+bool IsPlausible(const SourceWindow::State& window) {
+  // A start value: any finite number is valid. It lies between 0 and 1 where the last solve converged.
+  return AllWithin(window.start, -1e3f, 1e3f) && std::abs(window.corner.ix) <= -kNowhere.ix &&
+         std::abs(window.corner.iy) <= -kNowhere.iy && window.step_s >= 0.0f && std::isfinite(window.step_s) &&
+         window.interface.IsPlausible();
 }
 
 /// Stored record of a brick: its warm box, and the box of the rows that hold damage.
@@ -175,9 +115,6 @@ bool GetVolume(Reader* reader, VolumeField* volume) {
   return true;
 }
 
-/// Default of an array of FloatArrays; an array that holds nothing else is not stored.
-float DefaultOf(std::size_t array) { return array == 1 ? 1.0f : 0.0f; }
-
 }  // namespace
 
 struct ThermalSolver::Header {
@@ -219,7 +156,6 @@ std::size_t ThermalSolver::CheckpointCapacity(const SheetScene& scene) {
 
 std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   if (topology_.staged()) return 0;
-  const std::vector<const Tile*> tiles = field_.Existing();
   Writer writer(out);
   Header header{};
   header.layout = LayoutOf(params_.model);
@@ -231,8 +167,7 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   header.memory = memory_;
   header.clock_s = clock_s_;
   header.protected_dt_s = protected_dt_s_;
-  const auto blank = [](const Tile* tile) { return IsBlank(tile->state); };
-  header.tile_count = static_cast<std::uint32_t>(tiles.size() - std::count_if(tiles.begin(), tiles.end(), blank));
+  header.tile_count = StoredTiles(field_);
   std::vector<CellIndex> line;
   for (const LineCell& cell : cut_meter_.line()) line.push_back(cell.at);
   const std::span<const ToolPath::Point> path = cut_meter_.path().points();
@@ -265,22 +200,7 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   for (const auto* field : {&bits.dead_nodes, &bits.dead_edges, &bits.shrink}) {
     writer.Put(std::span<const std::uint8_t>(*field));
   }
-  for (const Tile* tile : tiles) {
-    const TileState& s = tile->state;
-    if (IsBlank(s)) continue;
-    const auto arrays = FloatArrays(s);
-    std::array<std::uint32_t, 4> record{static_cast<std::uint32_t>(tile->index), 0, s.awake, s.tented};
-    for (std::size_t a = 0; a < arrays.size(); ++a) {
-      const float usual = DefaultOf(a);
-      const bool worth = std::any_of(arrays[a]->begin(), arrays[a]->end(), [&](float v) { return v != usual; });
-      record[1] |= worth ? 1u << a : 0u;
-    }
-    writer.PutValue(record);
-    for (std::size_t a = 0; a < arrays.size(); ++a) {
-      if ((record[1] >> a & 1u) != 0) writer.Put(std::span<const float>(*arrays[a]));
-    }
-    writer.Put(std::span<const std::uint8_t>(s.flags));
-  }
+  PutTiles(field_, &writer);
   if (volume_ != nullptr) PutVolume(*volume_, &writer);
   return writer.used();
 }
@@ -293,12 +213,7 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
       !reader.GetValue(&window)) {
     return false;
   }
-  // A start value: any finite number is valid. It lies between 0 and 1 where the last solve converged.
-  if (!AllWithin(window.start, -1e3f, 1e3f) || std::abs(window.corner.ix) > -kNowhere.ix ||
-      std::abs(window.corner.iy) > -kNowhere.iy || !(window.step_s >= 0.0f && std::isfinite(window.step_s)) ||
-      !window.interface.IsPlausible()) {
-    return false;
-  }
+  if (!IsPlausible(window)) return false;
   CellIndex paper_corner;
   std::vector<float> paper_potential(paper_ != nullptr ? paper_->potential().size() : 0);
   if (paper_ != nullptr && (!reader.GetValue(&paper_corner) || !reader.Get(std::span(paper_potential)))) return false;
@@ -327,28 +242,7 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   if (!std::all_of(samples.begin(), samples.end(), finite) || !topology_.Fits(bits)) {
     return false;
   }
-  TileState state;
-  std::int64_t last = -1;
-  for (std::uint32_t n = 0; n < header.tile_count; ++n) {
-    std::array<std::uint32_t, 4> record;
-    bool good = reader.GetValue(&record) && record[0] > last && record[2] <= 1 && record[3] <= 1 &&
-                record[0] < static_cast<std::uint32_t>(field_.sheet().tile_count());
-    last = record[0];
-    const auto arrays = FloatArrays(state);
-    for (std::size_t a = 0; good && a < arrays.size(); ++a) {
-      arrays[a]->fill(DefaultOf(a));
-      if ((record[1] >> a & 1u) != 0) good = reader.Get(std::span<float>(*arrays[a]));
-    }
-    good = good && reader.Get(std::span<std::uint8_t>(state.flags)) &&
-           Plausible(state, static_cast<int>(record[0]), field_);
-    if (!good) {
-      field_.Clear();
-      return false;
-    }
-    state.awake = static_cast<std::uint8_t>(record[2]);
-    state.tented = static_cast<std::uint8_t>(record[3]);
-    field_.Restore(static_cast<int>(record[0]), state);
-  }
+  if (!GetTiles(&reader, header.tile_count, &field_)) return false;
   const bool volume_good = volume_ == nullptr || GetVolume(&reader, volume_.get());
   const bool length_good = header.cut_length_m >= 0.0f && header.cut_length_m <= header.measured_length_m;
   if (!volume_good || !length_good ||
@@ -376,6 +270,68 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   std::copy(samples.begin(), samples.end(), protected_.samples().begin());
   std::copy(alarm_state.begin(), alarm_state.end(), protected_.alarm_state().begin());
   protected_.set_warm(header.protected_warm != 0);
+  return true;
+}
+
+struct SolidSurface::Record {
+  std::uint64_t layout;
+  std::uint64_t frame, quarantined;
+  Ledger ledger;
+  float highest_C, dead_m2, reported_m2, power_W;
+  std::uint32_t tile_count, used;
+
+  [[nodiscard]] bool Plausible() const {
+    return layout == kSolidLayout && used <= 1 && highest_C >= 0 && dead_m2 >= 0 && reported_m2 >= 0 &&
+           std::isfinite(highest_C + dead_m2 + reported_m2 + power_W) &&
+           std::isfinite(ledger.joule + ledger.generator + ledger.Out() + ledger.hook + ledger.film + ledger.plume);
+  }
+};
+
+std::size_t SolidSurface::CheckpointCapacity() {
+  return kSolidTileCapacity + sizeof(Record) + sizeof(SourceWindow::State);
+}
+
+std::size_t SolidSurface::Save(std::span<std::byte> out) const {
+  Writer writer(out);
+  Record record{};
+  record.layout = kSolidLayout;
+  record.frame = frame_;
+  record.quarantined = field_.quarantined();
+  record.ledger = ledger_;
+  record.highest_C = highest_C_;
+  record.dead_m2 = dead_m2_;
+  record.reported_m2 = reported_m2_;
+  record.power_W = power_W_;
+  record.tile_count = StoredTiles(field_);
+  record.used = frame_ > 0 ? 1 : 0;
+  writer.PutValue(record);
+  if (record.used == 0) return writer.used();
+  SourceWindow::State window;
+  source_.Export(&window);
+  writer.PutValue(window);
+  PutTiles(field_, &writer);
+  return writer.used();
+}
+
+bool SolidSurface::Restore(std::span<const std::byte> bytes) {
+  Reader reader(bytes);
+  Record record;
+  if (!reader.GetValue(&record) || !record.Plausible()) return false;
+  if (record.used == 0) return record.frame == 0 && record.tile_count == 0;
+  SourceWindow::State window;
+  if (!reader.GetValue(&window) || !IsPlausible(window) ||
+      record.tile_count > static_cast<std::uint32_t>(field_.sheet().tile_count()) ||
+      !GetTiles(&reader, record.tile_count, &field_)) {
+    return false;
+  }
+  frame_ = record.frame;
+  field_.RestoreQuarantined(record.quarantined);
+  ledger_ = record.ledger;
+  highest_C_ = record.highest_C;
+  dead_m2_ = record.dead_m2;
+  reported_m2_ = record.reported_m2;
+  power_W_ = record.power_W;
+  source_.Import(window);
   return true;
 }
 

@@ -118,6 +118,8 @@ class SourceWindow {
   float tolerance = kWorkingTolerance;  ///< Relative error of the potential in the energy norm.
 
   [[nodiscard]] const Interface& interface() const { return interface_; }
+  /// The state of the metal after it has touched tissue of another window.
+  void SetInterface(const Interface& interface) { interface_ = interface; }
   /// Cools the metal, which loses heat to its shaft and the air.
   void CoolHook(float dt_s) { interface_.Cool(dt_s); }
 

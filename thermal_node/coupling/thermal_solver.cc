@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "services/base/core/hash.h"
+#include "thermal_node/coupling/tip_parts.h"
 
 namespace fulcrum::thermal {
 namespace {
@@ -15,16 +15,6 @@ constexpr int kSearchCells = 12;
 /// Shortest time between two events of one kind [s]: few enough for sounds and the report; assumed.
 constexpr float kSteamQuiet_s = 0.2f, kCutQuiet_s = 0.1f, kQuarantineQuiet_s = 1.0f;
 constexpr float kCutReport_m = 5e-4f;  ///< A cut event per half millimetre.
-
-/// Below this excess temperature the metal's heat exchange with tissue is neglected [K].
-constexpr float kHookWarm = 2.0f;
-
-float DurationOf(const TipInput& tip, float dt_s) { return tip.duration_s > 0.0f ? tip.duration_s : dt_s; }
-float Duration(std::span<const TipInput> tips, float dt_s) {
-  float sum = 0;
-  for (const TipInput& tip : tips) sum += DurationOf(tip, dt_s);
-  return sum;
-}
 
 /// If the tissue beneath is computed, the sheet's sink to it is set to 0: the contact with the volume replaces it.
 ThermalParams SheetParams(ThermalParams params) {
@@ -56,10 +46,8 @@ ThermalSolver::ThermalSolver(const SheetScene& scene)
 
 bool ThermalSolver::Idle(std::span<const TipInput> tips) const {
   const bool below_idle = volume_ == nullptr || volume_->idle();
-  // Metal at the temperature of the tissue exchanges no heat with it.
-  const bool hot_metal = std::abs(source_.interface().hook_theta) > kHookWarm;
-  const bool acts = std::any_of(tips.begin(), tips.end(),
-                                [&](const TipInput& tip) { return tip.active || (tip.touching && hot_metal); });
+  const float hook_theta = source_.interface().hook_theta;
+  const bool acts = std::any_of(tips.begin(), tips.end(), [&](const TipInput& tip) { return Acts(tip, hook_theta); });
   return !acts && field_.idle() && below_idle && !topology_.staged() && tears_.empty() && !protected_.warm() &&
          cut_length_m_ == cut_meter_.length_m();
 }
@@ -174,20 +162,13 @@ void ThermalSolver::PaperFrame(std::span<const TipInput> tips, float dt_s) {
 }
 
 void ThermalSolver::ApplySource(std::span<const TipInput> tips, float dt_s, float from, float to) {
-  const float all_s = Duration(tips, dt_s), from_s = from * all_s, to_s = to * all_s;
-  float begin_s = 0;
-  for (const TipInput& tip : tips) {
-    const float length_s = DurationOf(tip, dt_s), end_s = begin_s + length_s;
-    const float a = (std::max(from_s, begin_s) - begin_s) / length_s, b = (std::min(to_s, end_s) - begin_s) / length_s;
-    begin_s = end_s;
-    const bool hot_metal = std::abs(source_.interface().hook_theta) > kHookWarm;
-    if (!(b > a) || !(tip.active || (tip.touching && hot_metal))) continue;
-    const TipPath part = PartOf(tip.path, a, b);
+  ForPartsOf(tips, dt_s, from, to, [&](const TipInput& tip, const TipPath& part, float length_s) {
+    if (!Acts(tip, source_.interface().hook_theta)) return;
     const Drive drive = tip.active ? MakeDrive(params_, tip.mode, tip.power_W) : Drive{};
     if (tip.active) AddPath(part, tip.mode);
-    source_.Run(&field_, part, drive, (b - a) * length_s, &ledger_);
-    if (volume_ != nullptr && tip.active) AddLeakHeat((b - a) * length_s);
-  }
+    source_.Run(&field_, part, drive, length_s, &ledger_);
+    if (volume_ != nullptr && tip.active) AddLeakHeat(length_s);
+  });
 }
 
 void ThermalSolver::AddLeakHeat(float duration_s) {
@@ -209,20 +190,8 @@ void ThermalSolver::UpdateVolume(float dt_s) {
 
 void ThermalSolver::UpdateDamage(float dt_s) {
   for (Tile* tile : field_.awake()) {
-    if (!damage_.Update(tile, dt_s)) QuarantineBadDamage(tile);
+    if (!damage_.Update(tile, dt_s)) field_.QuarantineBadDamage(tile, &ledger_);
   }
-}
-
-void ThermalSolver::QuarantineBadDamage(Tile* tile) {
-  TileState& s = tile->state;
-  for (int k = 0; k < kTileCells; ++k) {
-    if (std::isfinite(s.omega_cell[k] + s.omega_collagen[k] + s.charred[k])) continue;
-    s.omega_cell[k] = s.omega_collagen[k] = s.charred[k] = 0;
-    field_.TakeOut(tile, k, kQuarantined, &ledger_.quarantined);
-    // Its heat is booked; NaN makes RefreshTheta() count the cell.
-    s.enthalpy[k] = std::numeric_limits<float>::quiet_NaN();
-  }
-  field_.RefreshTheta(tile, &ledger_);
 }
 
 void ThermalSolver::UpdateTopology() {

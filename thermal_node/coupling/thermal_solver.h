@@ -122,7 +122,6 @@ class ThermalSolver {
   void AddLeakHeat(float duration_s);
   void UpdateVolume(float dt_s);
   void UpdateDamage(float dt_s);
-  void QuarantineBadDamage(Tile* tile);
   void StageTears();
   void UpdateTopology();
   void StageShrink();
@@ -136,7 +135,8 @@ class ThermalSolver {
 
   /// State that limits how often an event is reported.
   struct EventMemory {
-    std::array<float, 10> quiet_until_s{};  ///< Per kind: no report before this time of the solver's clock.
+    std::array<float, kThermalEventKinds>
+        quiet_until_s{};  ///< Per kind: no report before this time of the solver's clock.
     float reported_cut_m = 0;
     std::uint64_t quarantined = 0;
     double vapour = 0;

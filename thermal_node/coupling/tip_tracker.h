@@ -34,6 +34,8 @@ class TipTracker {
   /// two, so the heat does not depend on when samples arrive.
   /// @param demand mode and set power at the sample's time.
   [[nodiscard]] TipInput Advance(const CauteryContact& sample, const GeneratorDemand& demand, double dt_s);
+  /// The next sample begins a new path: its place says nothing of the last one's.
+  void BreakPath() { on_path_ = false; }
   /// Returns false for a sample that is out of range or off the sheet; it must not be passed to Advance.
   [[nodiscard]] bool Accepts(const CauteryContact& sample) const;
   /// Returns true if the path to this sample has been applied already: a restarted physics node repeats the last tenth

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace fulcrum::thermal {
@@ -233,6 +234,18 @@ void HeatField::SleepCold(Ledger* ledger) {
     return true;
   };
   std::erase_if(awake_, cold);
+}
+
+void HeatField::QuarantineBadDamage(Tile* tile, Ledger* ledger) {
+  TileState& s = tile->state;
+  for (int k = 0; k < kTileCells; ++k) {
+    if (std::isfinite(s.omega_cell[k] + s.omega_collagen[k] + s.charred[k])) continue;
+    s.omega_cell[k] = s.omega_collagen[k] = s.charred[k] = 0;
+    TakeOut(tile, k, kQuarantined, &ledger->quarantined);
+    // Its heat is booked; NaN makes RefreshTheta() count the cell.
+    s.enthalpy[k] = std::numeric_limits<float>::quiet_NaN();
+  }
+  RefreshTheta(tile, ledger);
 }
 
 double HeatField::Stored() const {

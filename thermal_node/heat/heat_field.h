@@ -73,6 +73,9 @@ class HeatField {
   /// Removes or quarantines a cell; its heat is added to `account` [J].
   void TakeOut(Tile* tile, int cell, CellFlag why, double* account);
 
+  /// Takes out the cells whose damage is not finite (DamageModel::Update has returned false).
+  void QuarantineBadDamage(Tile* tile, Ledger* ledger);
+
   /// Heat held by all awake tiles [J].
   [[nodiscard]] double Stored() const;
   /// Highest theta of awake tissue [K]; 0 when all sleep.

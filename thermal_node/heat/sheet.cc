@@ -132,33 +132,41 @@ void Spread(const Sheet& sheet, std::vector<std::uint8_t>* known, std::vector<Su
   }
 }
 
+/// Calls visit(index, weights of the corners) for the points of the lattice in a triangle of material coordinates [m].
+template <class Visit>
+void ForLatticeIn(const Sheet& sheet, const std::array<Vec2f, 3>& corners, const Visit& visit) {
+  const Vec2f origin(static_cast<float>(sheet.origin_x), static_cast<float>(sheet.origin_y));
+  const auto place = [&](const Vec2f& p) -> Vec2f {
+    return (p / sheet.cell_m - origin) / static_cast<float>(kMetricStep);
+  };
+  const Vec2f a = place(corners[0]), b = place(corners[1]), c = place(corners[2]);
+  const float area = Cross(b - a, c - a);
+  if (area == 0.0f) return;
+  const Vec2f low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
+  for (int y = std::max(0, static_cast<int>(std::ceil(low.y()))); y <= high.y() && y < sheet.metric_y; ++y) {
+    for (int x = std::max(0, static_cast<int>(std::ceil(low.x()))); x <= high.x() && x < sheet.metric_x; ++x) {
+      const Vec2f p(static_cast<float>(x), static_cast<float>(y));
+      const float wb = Cross(p - a, c - a) / area, wc = Cross(b - a, p - a) / area, wa = 1 - wb - wc;
+      if (std::min({wa, wb, wc}) < -1e-4f) continue;
+      visit(static_cast<std::size_t>(y) * sheet.metric_x + x, wa, wb, wc);
+    }
+  }
+}
+
 /// Samples the metric of the mesh at the points of the lattice, linear within each triangle.
 void MeasureMetric(const SheetScene& scene, Sheet* sheet) {
   const MembraneGrid& grid = scene.membrane;
   const std::vector<SurfaceMetric> at_node = NodeMetric(scene);
   MakeLattice(sheet);
   std::vector<std::uint8_t> known(sheet->metric.size(), 0);
-  const Vec2f origin(static_cast<float>(sheet->origin_x), static_cast<float>(sheet->origin_y));
-  const auto place = [&](Index n) -> Vec2f {
-    return (scene.membrane_material[n] / sheet->cell_m - origin) / static_cast<float>(kMetricStep);
-  };
   const auto triangle = [&](Index na, Index nb, Index nc) {
-    const Vec2f a = place(na), b = place(nb), c = place(nc);
-    const float area = Cross(b - a, c - a);
-    if (area == 0.0f) return;
-    const Vec2f low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
-    for (int y = std::max(0, static_cast<int>(std::ceil(low.y()))); y <= high.y() && y < sheet->metric_y; ++y) {
-      for (int x = std::max(0, static_cast<int>(std::ceil(low.x()))); x <= high.x() && x < sheet->metric_x; ++x) {
-        const Vec2f p(static_cast<float>(x), static_cast<float>(y));
-        const float wb = Cross(p - a, c - a) / area, wc = Cross(b - a, p - a) / area, wa = 1 - wb - wc;
-        if (std::min({wa, wb, wc}) < -1e-4f) continue;
-        const SurfaceMetric &ga = at_node[na], &gb = at_node[nb], &gc = at_node[nc];
-        const std::size_t k = static_cast<std::size_t>(y) * sheet->metric_x + x;
-        sheet->metric[k] = Bounded({wa * ga.ss + wb * gb.ss + wc * gc.ss, wa * ga.st + wb * gb.st + wc * gc.st,
-                                    wa * ga.tt + wb * gb.tt + wc * gc.tt});
-        known[k] = 1;
-      }
-    }
+    const std::array corners{scene.membrane_material[na], scene.membrane_material[nb], scene.membrane_material[nc]};
+    ForLatticeIn(*sheet, corners, [&](std::size_t k, float wa, float wb, float wc) {
+      const SurfaceMetric &ga = at_node[na], &gb = at_node[nb], &gc = at_node[nc];
+      sheet->metric[k] = Bounded({wa * ga.ss + wb * gb.ss + wc * gc.ss, wa * ga.st + wb * gb.st + wc * gc.st,
+                                  wa * ga.tt + wb * gb.tt + wc * gc.tt});
+      known[k] = 1;
+    });
   };
   for (Index r = 0; r + 1 < grid.rows; ++r) {
     for (Index c = 0; c + 1 < grid.cols; ++c) {
@@ -240,6 +248,37 @@ Sheet MakeSheet(const SheetScene& scene) {
     }
   }
   MeasureMetric(scene, &sheet);
+  return sheet;
+}
+
+/// A chart is a projection along its normal m. On a plane with the unit normal n a step along s climbs by
+/// -(n . s) / (n . m).
+Sheet MakeSolidSheet(const TissueScene& scene, const SolidCharts& charts) {
+  Sheet sheet = MakeEmpty(Vec2f::Zero(),
+                          kSolidCell_m * Vec2f(static_cast<float>(charts.width), static_cast<float>(charts.height)),
+                          kSolidCell_m);
+  MakeLattice(&sheet);
+  std::vector<std::uint8_t> known(sheet.metric.size(), 0);
+  for (Index t = 0; t < scene.tube_surface.size(); ++t) {
+    if (charts.of_triangle[t] == kNoIndex) continue;
+    const SolidChart& chart = charts.charts[charts.of_triangle[t]];
+    std::array<Vec3f, 3> x;
+    std::array<Vec2f, 3> material;
+    for (std::size_t k = 0; k < 3; ++k) {
+      x[k] = scene.rest_position[scene.tube_surface[t][k]];
+      material[k] = chart.Material(x[k]);
+    }
+    FillTriangle(&sheet, material[0], material[1], material[2]);
+    const Vec3f normal = (x[1] - x[0]).cross(x[2] - x[0]).stableNormalized();
+    const float up = std::max(normal.dot(chart.normal()), 0.1f);
+    const float p = normal.dot(chart.s_axis) / up, q = normal.dot(chart.t_axis) / up;
+    const SurfaceMetric metric = Bounded({1 + p * p, p * q, 1 + q * q});
+    ForLatticeIn(sheet, material, [&](std::size_t k, float, float, float) {
+      sheet.metric[k] = metric;
+      known[k] = 1;
+    });
+  }
+  if (std::find(known.begin(), known.end(), 1) != known.end()) Spread(sheet, &known, &sheet.metric);
   return sheet;
 }
 

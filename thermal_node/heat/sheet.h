@@ -1,4 +1,5 @@
-// The membrane as cells in material space: place of its tiles, cells that are tissue, and rest lengths of the cells.
+// A surface as cells in material space: place of its tiles, cells that are tissue, and rest lengths of the cells. The
+// membrane is one, the charts of the solids are another.
 #pragma once
 
 #include <cmath>
@@ -7,6 +8,7 @@
 #include <vector>
 
 #include "services/base/core/scene_view.h"
+#include "services/base/core/solid_charts.h"
 
 namespace fulcrum::thermal {
 
@@ -57,6 +59,8 @@ struct Sheet {
 /// Throws InputError when the scene has no membrane, or its material coordinates are not finite or are larger than the
 /// atlas.
 [[nodiscard]] Sheet MakeSheet(const SheetScene& scene);
+/// The charts of the solids, with cells of kSolidCell_m.
+[[nodiscard]] Sheet MakeSolidSheet(const TissueScene& scene, const SolidCharts& charts);
 /// A flat rectangle with its corner at (0, 0) [m].
 [[nodiscard]] Sheet MakeFlatSheet(float width_m, float height_m, float cell_m);
 /// Sets the metric from a function of material coordinates [m]. A metric that is not finite becomes isometric;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "services/base/core/hash.h"
 #include "services/base/runtime/realtime.h"
 
 namespace fulcrum::thermal {
@@ -17,9 +18,22 @@ constexpr std::int64_t kPedalWait_ns = 300'000'000;
 
 /// State of the node, stored before the solver's part of a checkpoint.
 struct NodeState {
-  TipTracker::State tip;
+  TipTracker::State tip, solid_tip;
   GeneratorInputs::State generator;
+  std::uint64_t solver_bytes;  ///< The rest is that of the solids.
 };
+
+/// A sample as the solids see it.
+CauteryContact OfSolids(const CauteryContact& sample) {
+  if (!sample.on_solid) {
+    CauteryContact none;
+    none.session_time_s = sample.session_time_s;
+    return none;
+  }
+  CauteryContact contact = sample;
+  contact.touching = true;
+  return contact;
+}
 
 }  // namespace
 
@@ -36,12 +50,18 @@ ThermalNode::ThermalNode(const SceneView& scene, const Ports& ports, runtime::Ch
       patch_stamper_(epoch_ns),
       event_stamper_(epoch_ns),
       manifest_stamper_(epoch_ns) {
+  if (SolidsBurn(scene_)) {
+    solids_ = std::make_unique<SolidSurface>(scene_);
+    solid_tracker_.emplace(solids_->field().sheet(), scene_.thermal.hook_radius_m);
+    solid_planner_.emplace(solids_->field(), kSolidCell_m);
+  }
   topology_.scene_hash = scene_.hash;
   topology_.rows = scene_.membrane.rows;
   topology_.cols = scene_.membrane.cols;
   manifest_.node = NodeId::kThermal;
   contacts_.reserve(kMostSamples);
   tips_.reserve(kMostSamples);
+  solid_tips_.reserve(kMostSamples);
   manifest_.consumed.reserve(4 * kMostSamples + 1);
   if (checkpoint_ != nullptr) {
     if (const auto latest = checkpoint_->Latest()) restored_ = Restore(latest->payload);
@@ -56,9 +76,10 @@ void ThermalNode::Step(const Tick& tick) {
   }
   ++ticks_;
   TakeGeneratorInputs(tick);
-  const std::span<const TipInput> tips = TakeContacts(tick);
+  TakeContacts(tick);
   TakeTears();
-  solver_.Step(tips, static_cast<float>(tick.dt_s));
+  solver_.Step(tips_, static_cast<float>(tick.dt_s));
+  StepSolids(tick.dt_s);
   // The manifest is published before the checkpoint is written: so a recording has the manifest of every tick that a
   // checkpoint can hold, and a replay derives from the first state hash after a restart whether the last tick was in
   // the checkpoint.
@@ -68,7 +89,16 @@ void ThermalNode::Step(const Tick& tick) {
   PublishOpenCells(tick);
   PublishEvents(tick);
   PublishPatch(tick);
-  if (solver_.stepped() || no_setting_) NoteHealth();
+  if (solver_.stepped() || solids_stepped_ || no_setting_) NoteHealth();
+}
+
+void ThermalNode::StepSolids(double dt_s) {
+  if (solids_ == nullptr) return;
+  const bool before = solids_stepped_;
+  Interface hook = solver_.source()->interface();
+  solids_stepped_ = solids_->Step(solid_tips_, static_cast<float>(dt_s), &hook);
+  if (solids_stepped_) solver_.source()->SetInterface(hook);
+  if (before && !solids_stepped_) NoteHealth();  // No more current.
 }
 
 void ThermalNode::TakeGeneratorInputs(const Tick& tick) {
@@ -82,14 +112,19 @@ void ThermalNode::TakeGeneratorInputs(const Tick& tick) {
   waits_ = waits_ && !received && tick.stamp_ns < wait_until_ns_;
 }
 
-std::span<const TipInput> ThermalNode::TakeContacts(const Tick& tick) {
+bool ThermalNode::Accepts(const CauteryContact& sample) const {
+  return tracker_.Accepts(sample) && (!solid_tracker_ || solid_tracker_->Accepts(OfSolids(sample)));
+}
+
+void ThermalNode::TakeContacts(const Tick& tick) {
   tips_.clear();
+  solid_tips_.clear();
   contacts_.clear();
   manifest_.consumed.clear();
-  if (waits_) return tips_;
+  if (waits_) return;
   CauteryContact next;
   while (contacts_.size() < kMostSamples && ports_.contact.TakeNext(&next)) {
-    if (!tracker_.Accepts(next)) {
+    if (!Accepts(next)) {
       ++refused_;
       continue;
     }
@@ -103,13 +138,24 @@ std::span<const TipInput> ThermalNode::TakeContacts(const Tick& tick) {
     generator_.DropBefore(ns);
     no_setting_ = demand.mode != CauteryMode::kOff && !generator_.has_setting();
     tips_.push_back(tracker_.Advance(contact, demand, tick.dt_s));
+    if (solids_ != nullptr) solid_tips_.push_back(AdvanceOnSolids(contact, demand, tick.dt_s));
     manifest_.consumed.push_back({TopicId::kCauteryContact, contact.stamp.epoch, contact.stamp.sequence});
   }
-  return tips_;
+}
+
+/// Charts that are neighbours in the atlas are not on the solid.
+TipInput ThermalNode::AdvanceOnSolids(const CauteryContact& sample, const GeneratorDemand& demand, double dt_s) {
+  if (sample.on_solid) {
+    const Index chart = solids_->ChartOf(sample.triangle);
+    if (chart != solid_chart_) solid_tracker_->BreakPath();
+    solid_chart_ = chart;
+  }
+  return solid_tracker_->Advance(OfSolids(sample), demand, dt_s);
 }
 
 std::size_t ThermalNode::CheckpointCapacity(const SceneView& scene) {
-  return sizeof(NodeState) + ThermalSolver::CheckpointCapacity(scene);
+  return sizeof(NodeState) + ThermalSolver::CheckpointCapacity(scene) +
+         (SolidsBurn(scene) ? SolidSurface::CheckpointCapacity() : 0);
 }
 
 bool ThermalNode::Restore(std::span<const std::byte> checkpoint) {
@@ -119,9 +165,20 @@ bool ThermalNode::Restore(std::span<const std::byte> checkpoint) {
   // Restored as a whole or not at all: the tip's path must continue where the solver's cut ends.
   TipTracker tracker = tracker_;
   GeneratorInputs generator = generator_;
-  return tracker.Restore(state.tip) && generator.Restore(state.generator) &&
-         solver_.Restore(checkpoint.subspan(sizeof(state))) && tracker_.Restore(state.tip) &&
-         generator_.Restore(state.generator);
+  std::optional<TipTracker> solid_tracker = solid_tracker_;
+  const std::span<const std::byte> rest = checkpoint.subspan(sizeof(state));
+  if (state.solver_bytes > rest.size()) return false;
+  if (!tracker.Restore(state.tip) || !generator.Restore(state.generator) ||
+      (solid_tracker && !solid_tracker->Restore(state.solid_tip)) ||
+      (solids_ != nullptr && !solids_->Restore(rest.subspan(state.solver_bytes)))) {
+    return false;
+  }
+  if (!solver_.Restore(rest.first(state.solver_bytes))) {
+    if (solids_ != nullptr) solids_->Clear();
+    return false;
+  }
+  return tracker_.Restore(state.tip) && generator_.Restore(state.generator) &&
+         (!solid_tracker_ || solid_tracker_->Restore(state.solid_tip));
 }
 
 /// Each message holds the whole state, so a lost or a repeated one has no effect.
@@ -137,17 +194,24 @@ void ThermalNode::TakeTears() {
 
 /// Called before a new revision is published, so every revision that a reader has seen survives a restart.
 void ThermalNode::SaveCheckpoint() {
-  if (checkpoint_ == nullptr || !solver_.stepped()) return;
+  if (checkpoint_ == nullptr || !(solver_.stepped() || solids_stepped_)) return;
   ++frames_since_checkpoint_;
   const bool due = solver_.committed() || frames_since_checkpoint_ >= kFramesPerCheckpoint;
-  if (!due || !solver_.at_commit_frame()) return;
+  // A solver that rests has nothing staged.
+  if (!due || (solver_.stepped() && !solver_.at_commit_frame())) return;
   const std::span<std::byte> slot = checkpoint_->Begin();
-  const std::size_t bytes = solver_.Save(slot.subspan(sizeof(NodeState)));
-  checkpoint_full_ = bytes == 0;
-  if (bytes > 0) {
-    const NodeState state{tracker_.Save(), generator_.Save()};
+  const std::span<std::byte> room = slot.subspan(sizeof(NodeState));
+  const std::size_t bytes = solver_.Save(room);
+  const std::size_t solid_bytes = bytes > 0 && solids_ != nullptr ? solids_->Save(room.subspan(bytes)) : 0;
+  checkpoint_full_ = bytes == 0 || (solids_ != nullptr && solid_bytes == 0);
+  if (!checkpoint_full_) {
+    NodeState state{};
+    state.tip = tracker_.Save();
+    if (solid_tracker_) state.solid_tip = solid_tracker_->Save();
+    state.generator = generator_.Save();
+    state.solver_bytes = bytes;
     std::memcpy(slot.data(), &state, sizeof(state));
-    checkpoint_->Commit(sizeof(state) + bytes);
+    checkpoint_->Commit(sizeof(state) + bytes + solid_bytes);
   }
   frames_since_checkpoint_ = 0;
 }
@@ -178,21 +242,27 @@ void ThermalNode::PublishOpenCells(const Tick& tick) {
 }
 
 void ThermalNode::PublishEvents(const Tick& tick) {
-  for (const SolverEvent& event : solver_.events()) {
-    ThermalEvent message;
-    message.stamp = event_stamper_.Next(tick.stamp_ns);
-    message.session_time_s = tick.session_time_s;
-    message.kind = event.kind;
-    message.material = event.material;
-    message.temperature_C = event.temperature_C;
-    message.value = event.value;
-    message.topology_revision = solver_.topology().revision();
-    ports_.event.Write(message);
+  for (const SolverEvent& event : solver_.events()) PublishEvent(tick, event);
+  if (solids_stepped_ && solids_->burn()) {
+    const SolidBurn& burn = *solids_->burn();
+    PublishEvent(tick, {ThermalEventKind::kSolidBurn, burn.material, burn.temperature_C, burn.dead_m2});
   }
 }
 
+void ThermalNode::PublishEvent(const Tick& tick, const SolverEvent& event) {
+  ThermalEvent message;
+  message.stamp = event_stamper_.Next(tick.stamp_ns);
+  message.session_time_s = tick.session_time_s;
+  message.kind = event.kind;
+  message.material = event.material;
+  message.temperature_C = event.temperature_C;
+  message.value = event.value;
+  message.topology_revision = solver_.topology().revision();
+  ports_.event.Write(message);
+}
+
 void ThermalNode::PublishPatch(const Tick& tick) {
-  patch_note_due_ = patch_note_due_ || solver_.stepped();
+  patch_note_due_ = patch_note_due_ || solver_.stepped() || solids_stepped_;
   patch_due_ = patch_due_ || ticks_ % kTicksPerPatch == 0;
   history_due_ = history_due_ || ticks_ % kTicksPerHistoryPatch == 0;
   // Frames that commit have the most work already.
@@ -202,20 +272,46 @@ void ThermalNode::PublishPatch(const Tick& tick) {
   const bool new_reader = readers && !patch_readers_;
   patch_readers_ = readers;
   if (!readers) return;
-  if (patch_note_due_ || new_reader) planner_.Note(solver_.mutable_field(), new_reader);
-  patch_note_due_ = false;
-  std::optional<PatchPlace> place = planner_.Next(solver_.field());
-  if (!place && history_due_) place = planner_.NextOfHistory();
-  history_due_ = false;
-  if (!place) return;
+  const std::optional<NextPatch> next = ChoosePatch(new_reader);
+  if (!next) return;
+  const PatchPlace& place = next->place;
+  const bool of_solids = next->surface == BurntSurface::kSolids;
   ports_.patch.WriteInPlace([&](TemperaturePatch::View view) {
     view.header.stamp = patch_stamper_.Next(tick.stamp_ns);
     view.header.topology_revision = solver_.topology().revision();
-    view.header.slot = place->slot;
-    view.header.origin_x = place->origin_x;
-    view.header.origin_y = place->origin_y;
-    view.header.max_temperature_C = DrawPatch(solver_.field(), scene_.membrane.texel_m, *place, view.texels);
+    view.header.surface = next->surface;
+    // Slots of their own: a reader knows a place by its slot.
+    view.header.slot = static_cast<std::uint16_t>(place.slot + (of_solids ? kPatchSlots : 0));
+    view.header.origin_x = place.origin_x;
+    view.header.origin_y = place.origin_y;
+    view.header.max_temperature_C = of_solids ? DrawPatch(solids_->field(), kSolidCell_m, place, view.texels)
+                                              : DrawPatch(solver_.field(), scene_.membrane.texel_m, place, view.texels);
   });
+}
+
+std::optional<ThermalNode::NextPatch> ThermalNode::ChoosePatch(bool new_reader) {
+  if (patch_note_due_ || new_reader) {
+    planner_.Note(solver_.mutable_field(), new_reader);
+    if (solids_ != nullptr) solid_planner_->Note(solids_->mutable_field(), new_reader);
+  }
+  patch_note_due_ = false;
+  solids_turn_ = !solids_turn_ && solids_ != nullptr;
+  std::optional<PatchPlace> place;
+  BurntSurface surface = BurntSurface::kMembrane;
+  for (const bool history : {false, true}) {
+    if (place || (history && !history_due_)) continue;
+    for (const bool of_solids : {solids_turn_, !solids_turn_}) {
+      if (place || (of_solids && solids_ == nullptr)) continue;
+      PatchPlanner& planner = of_solids ? *solid_planner_ : planner_;
+      surface = of_solids ? BurntSurface::kSolids : BurntSurface::kMembrane;
+      place = history     ? planner.NextOfHistory()
+              : of_solids ? planner.Next(solids_->field())
+                          : planner.Next(solver_.field());
+    }
+  }
+  history_due_ = false;
+  if (!place) return std::nullopt;
+  return NextPatch{surface, *place};
 }
 
 void ThermalNode::PublishManifest(const Tick& tick) {
@@ -223,16 +319,38 @@ void ThermalNode::PublishManifest(const Tick& tick) {
   manifest_.stamp = manifest_stamper_.Next(tick.stamp_ns);
   manifest_.tick = tick.index;
   manifest_.session_time_s = tick.session_time_s;
-  manifest_.state_hash = solver_.TickHash();
+  manifest_.state_hash = StateHash();
   ports_.manifest.Write(manifest_);
+}
+
+/// Solids that were never heated leave the hash as it is.
+std::uint64_t ThermalNode::StateHash() const {
+  const std::uint64_t of_solids = solids_ != nullptr ? solids_->TickHash() : 0;
+  if (of_solids == 0) return solver_.TickHash();
+  Hash64 hash;
+  hash.AddValue(solver_.TickHash());
+  hash.AddValue(of_solids);
+  return hash.value();
 }
 
 void ThermalNode::NoteHealth() {
   Figures f{};
   f.solver = solver_.figures();
   f.delivered_J = solver_.ledger().generator;
+  if (solids_ != nullptr) {
+    f.delivered_J += solids_->ledger().generator;
+    f.solids_dead_m2 = solids_->dead_m2();
+    f.solver.highest_C = std::max(f.solver.highest_C, solids_->highest_C());
+    f.solver.present_C = std::max(f.solver.present_C, scene_.thermal.body_temperature_C + solids_->field().MaxTheta());
+    f.solver.power_W += solids_->power_W();
+    f.solver.voltage_V = std::max(f.solver.voltage_V, solids_->voltage_V());
+    if (!solid_tips_.empty() && solid_tips_.back().active) f.solver.set_power_W = solid_tips_.back().power_W;
+  }
   // The sum over all cells takes as long as a substep of conduction, so it is not computed in every tick.
-  if (ticks_ % kTicksPerClosure == 0) closure_ = solver_.ledger().ClosureError(solver_.field().Stored());
+  if (ticks_ % kTicksPerClosure == 0) {
+    closure_ = solver_.ledger().ClosureError(solver_.field().Stored());
+    if (solids_ != nullptr) closure_ = std::max(closure_, solids_->ledger().ClosureError(solids_->field().Stored()));
+  }
   f.closure = closure_;
   f.revision = solver_.topology().revision();
   f.quarantined = solver_.field().quarantined();
@@ -262,6 +380,7 @@ void ThermalNode::FillHealth(Health* health) const {
                      {"cut_width_p95_mm", 1e3 * f.solver.cut_width_p95_m},
                      {"cut_off_way_mm", 1e3 * f.solver.cut_off_way_m},
                      {"debris_mm2", 1e6 * f.solver.debris_m2},
+                     {"solid_burn_mm2", 1e6 * f.solids_dead_m2},
                      {"hook_temperature_C", f.solver.hook_C},
                      {"set_power_W", f.solver.set_power_W},
                      {"power_W", f.solver.power_W},

@@ -3,7 +3,11 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "services/base/core/generator_inputs.h"
 #include "services/base/core/messages.h"
@@ -15,6 +19,7 @@
 #include "services/transport/bus/port.h"
 #include "thermal_node/coupling/open_window.h"
 #include "thermal_node/coupling/patch.h"
+#include "thermal_node/coupling/solid_surface.h"
 #include "thermal_node/coupling/thermal_solver.h"
 #include "thermal_node/coupling/tip_tracker.h"
 
@@ -28,7 +33,7 @@ inline constexpr std::uint64_t kTicksPerHistoryPatch = 100;
 /// A checkpoint is written at each new revision, and every this many frames of the solver while tissue is warm.
 inline constexpr std::uint64_t kFramesPerCheckpoint = 10;
 /// Version of the checkpoint's layout; must change with it.
-inline constexpr std::uint32_t kCheckpointLayout = 7;
+inline constexpr std::uint32_t kCheckpointLayout = 8;
 
 class ThermalNode {
  public:
@@ -58,6 +63,8 @@ class ThermalNode {
   void FillHealth(Health* health) const;
 
   [[nodiscard]] const ThermalSolver& solver() const { return solver_; }
+  /// nullptr: the scene's solids are not burnt (SolidsBurn).
+  [[nodiscard]] const SolidSurface* solids() const { return solids_.get(); }
   /// Returns true once after each change of the set power in Health. Call from the thread of Step.
   [[nodiscard]] bool TakeSettingChanged() { return std::exchange(setting_changed_, false); }
   /// True if the node continued from a checkpoint.
@@ -65,8 +72,13 @@ class ThermalNode {
 
  private:
   void TakeGeneratorInputs(const Tick& tick);
-  /// Reads the contact samples since the last tick and converts them to motions of the tip.
-  [[nodiscard]] std::span<const TipInput> TakeContacts(const Tick& tick);
+  /// Reads the contact samples since the last tick and converts them to motions of the tip, on the membrane and on the
+  /// solids.
+  void TakeContacts(const Tick& tick);
+  [[nodiscard]] bool Accepts(const CauteryContact& sample) const;
+  [[nodiscard]] TipInput AdvanceOnSolids(const CauteryContact& sample, const GeneratorDemand& demand, double dt_s);
+  void StepSolids(double dt_s);
+  [[nodiscard]] std::uint64_t StateHash() const;
   /// Reads the torn edges, if a new message arrived.
   void TakeTears();
   void SaveCheckpoint();
@@ -75,7 +87,14 @@ class ThermalNode {
   /// Publishes the removed cells around the hook while it touches tissue, if they have changed.
   void PublishOpenCells(const Tick& tick);
   void PublishEvents(const Tick& tick);
+  void PublishEvent(const Tick& tick, const SolverEvent& event);
   void PublishPatch(const Tick& tick);
+  struct NextPatch {
+    BurntSurface surface;
+    PatchPlace place;
+  };
+  /// Places of the membrane and of the solids that are due take turns.
+  [[nodiscard]] std::optional<NextPatch> ChoosePatch(bool new_reader);
   void PublishManifest(const Tick& tick);
   void NoteHealth();
 
@@ -85,19 +104,24 @@ class ThermalNode {
     std::uint64_t revision, quarantined, refused;
     std::uint32_t dead_edges, dead_nodes, awake_tiles, checkpoint_full, no_setting;
     float cut_length_m;
+    float solids_dead_m2;
   };
 
   SceneView scene_;
   Ports ports_;
   runtime::CheckpointFile* checkpoint_;
   ThermalSolver solver_;
+  std::unique_ptr<SolidSurface> solids_;  ///< Null: see solids().
   GeneratorInputs generator_;
   TipTracker tracker_;
   PatchPlanner planner_;
+  std::optional<TipTracker> solid_tracker_;
+  std::optional<PatchPlanner> solid_planner_;
   bus::Stamper topology_stamper_, open_stamper_, patch_stamper_, event_stamper_, manifest_stamper_;
 
   std::vector<CauteryContact> contacts_;
-  std::vector<TipInput> tips_;
+  std::vector<TipInput> tips_, solid_tips_;
+  Index solid_chart_ = kNoIndex;  ///< Of the last contact with a solid.
   TopologyState topology_;
   OpenCells open_cells_, open_now_;  ///< Last published, and current.
   TearState tears_;
@@ -109,7 +133,7 @@ class ThermalNode {
   float set_power_W_ = 0;           ///< Last value stored for Health.
   bool waits_ = false, setting_changed_ = false, no_setting_ = false;
   bool restored_ = false, topology_due_ = true, patch_readers_ = false, patch_due_ = false, history_due_ = false,
-       patch_note_due_ = false;
+       patch_note_due_ = false, solids_stepped_ = false, solids_turn_ = false;
   double closure_ = 0;
   bool checkpoint_full_ = false;
   runtime::SeqLock<Figures> figures_;

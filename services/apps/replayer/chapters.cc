@@ -36,6 +36,8 @@ const char* Alarm(ThermalEventKind kind) {
       return "heat near the nerve";
     case ThermalEventKind::kNerveInjury:
       return "nerve injured";
+    case ThermalEventKind::kSolidBurn:
+      return "organ burnt";
     default:
       return "";
   }

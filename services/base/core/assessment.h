@@ -142,6 +142,7 @@ enum class Prompt : std::uint32_t {
   kInjury,
   kUreterHot,
   kNerveHot,
+  kOrganBurnt,
   kForceTooHigh,
   kUreterNear,
   kNerveNear,
@@ -149,9 +150,9 @@ enum class Prompt : std::uint32_t {
   kGraspSlips,
   kOffLine
 };
-inline constexpr std::size_t kPromptCount = 9;
+inline constexpr std::size_t kPromptCount = 10;
 inline constexpr std::array<std::string_view, kPromptCount> kPromptTexts{
-    "injury: stop", "ureter is getting hot", "nerve is getting hot", "force too high", "ureter near",
+    "injury: stop", "ureter is getting hot", "nerve is getting hot", "organ burnt", "force too high", "ureter near",
     "nerve near",   "pedal, no contact",     "grasp slips",          "off the line"};
 
 inline constexpr std::uint32_t BitOf(Prompt prompt) { return 1u << static_cast<std::uint32_t>(prompt); }

@@ -32,12 +32,12 @@ namespace fulcrum {
 #define FULCRUM_FIELDS_OF_ContactModel(F) F(stamp) F(tool_sequence) F(tool_stamp_ns) F(physics_dt_s) F(devices)
 #define FULCRUM_FIELDS_OF_Footprint(F) F(x) F(y) F(width) F(gap)
 #define FULCRUM_FIELDS_OF_CauteryContact(F) F(stamp) F(session_time_s) F(topology_revision) F(touching) F(tented) \
-  F(tool) F(triangle) F(barycentric) F(material) F(material_rate) F(contact_radius_m) F(footprint)
+  F(on_solid) F(tool) F(triangle) F(barycentric) F(material) F(material_rate) F(contact_radius_m) F(footprint)
 #define FULCRUM_FIELDS_OF_TopologyState(F) F(stamp) F(scene_hash) F(revision) F(rows) F(cols) F(cut_length_m) \
   F(cut_width_m) F(cut_off_way_m) F(dead_nodes) F(dead_edges) F(shrink)
 #define FULCRUM_FIELDS_OF_TearState(F) F(stamp) F(scene_hash) F(rows) F(cols) F(torn_edges)
 #define FULCRUM_FIELDS_OF_OpenCells(F) F(stamp) F(scene_hash) F(x) F(y) F(rows)
-#define FULCRUM_FIELDS_OF_TemperaturePatchHeader(F) F(stamp) F(topology_revision) F(slot) F(origin_x) F(origin_y) \
+#define FULCRUM_FIELDS_OF_TemperaturePatchHeader(F) F(stamp) F(topology_revision) F(slot) F(surface) F(origin_x) F(origin_y) \
   F(max_temperature_C)
 #define FULCRUM_FIELDS_OF_TemperaturePatch(F) F(header) F(texels)
 #define FULCRUM_FIELDS_OF_PictureHeader(F) F(stamp) F(session_time_s) F(tool_sequence) F(tissue_sequence) F(width) \

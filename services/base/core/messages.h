@@ -201,13 +201,16 @@ struct CauteryContact {
   std::uint64_t topology_revision = 0;
   bool touching = false;  ///< The metal touches the membrane, or is close enough for an arc.
   bool tented = false;    ///< Membrane lifted off the tissue beneath.
+  bool on_solid = false;  ///< The metal touches no membrane, but the surface of a solid.
   std::uint8_t tool = 0;
-  std::uint32_t triangle = kNoIndex;  ///< Membrane triangle: 2 * cell + half, cell = row * (cols-1) + col.
+  /// Membrane triangle: 2 * cell + half, cell = row * (cols-1) + col; on a solid: of TissueScene::tube_surface.
+  std::uint32_t triangle = kNoIndex;
   std::array<float, 3> barycentric{0, 0, 0};
-  Vec2f material = Vec2f::Zero();       ///< (s, t) of the contact's centre on the rest sheet [m].
+  /// (s, t) of the contact's centre on the rest sheet, or in the charts of the solids (solid_charts.h) [m].
+  Vec2f material = Vec2f::Zero();
   Vec2f material_rate = Vec2f::Zero();  ///< Its rate of change [m/s].
   float contact_radius_m = 0;           ///< Radius of the metal about its axis.
-  Footprint footprint;                  ///< Footprint of the bare metal on the deformed membrane.
+  Footprint footprint;                  ///< Footprint of the bare metal on the deformed membrane or solid.
 };
 
 // -------------------------------------------------------------------------------------------- TopologyState
@@ -263,10 +266,14 @@ inline void SetBit(std::span<std::uint8_t> bits, std::size_t i) {
 
 // ----------------------------------------------------------------------------------------- TemperaturePatch
 
+/// What can be burnt, each with an atlas of its own.
+enum class BurntSurface : std::uint16_t { kMembrane, kSolids };
+
 struct TemperaturePatchHeader {
   Stamp stamp;
   std::uint64_t topology_revision = 0;
-  std::uint32_t slot = 0;      ///< Index of the hot spot; a slot is reused when its spot has gone cold.
+  std::uint16_t slot = 0;  ///< Index of the hot spot; a slot is reused when its spot has gone cold.
+  BurntSurface surface = BurntSurface::kMembrane;
   std::uint32_t origin_x = 0;  ///< Texel of the atlas where the patch begins (s direction).
   std::uint32_t origin_y = 0;  ///< The same in the t direction.
   float max_temperature_C = 0;
@@ -328,16 +335,19 @@ enum class ThermalEventKind : std::uint8_t {
   kUreterInjury,
   kNerveWarning,
   kNerveInjury,
-  kQuarantine
+  kQuarantine,
+  kSolidBurn
 };
+inline constexpr std::size_t kThermalEventKinds = 11;
 
 struct ThermalEvent {
   Stamp stamp;
   double session_time_s = 0;
   ThermalEventKind kind = ThermalEventKind::kContact;
-  Vec2f material = Vec2f::Zero();  ///< Place on the membrane (s, t) [m].
+  Vec2f material = Vec2f::Zero();  ///< Place on the membrane (s, t), for kSolidBurn in the charts of the solids [m].
   float temperature_C = 0;
-  float value = 0;  ///< Kind-specific: cut length so far [m] for kCut, damage integral for injuries.
+  /// Kind-specific: cut length so far [m] for kCut, damage integral for injuries, dead area [m^2] for kSolidBurn.
+  float value = 0;
   std::uint64_t topology_revision = 0;
 };
 

@@ -139,6 +139,7 @@ class Reader {
   }
 
   void Add(const TemperaturePatch& patch) {
+    if (patch.header.surface != BurntSurface::kMembrane) return;
     if (patch.texels.size() < std::size_t{4} * kPatchTexels * kPatchTexels) return;
     SheetTexels& texels = cut_.texels;
     const double time_s = 1e-9 * static_cast<double>(patch.header.stamp.stamp_ns - start_ns_);

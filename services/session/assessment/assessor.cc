@@ -73,7 +73,7 @@ void Assessor::Add(const ContactModel& model) {
 
 void Assessor::Add(const CauteryContact& contact) {
   if (!Counts(contact.session_time_s)) return;
-  contacts_.push_back({contact.session_time_s, contact.touching, contact.material, false});
+  contacts_.push_back({contact.session_time_s, contact.touching, contact.material, false, contact.on_solid});
   MeasureContacts(false);
 }
 
@@ -116,6 +116,9 @@ void Assessor::Add(const ThermalEvent& event) {
     case ThermalEventKind::kNerveWarning:
       ++alarms_[2];
       Raise(Prompt::kNerveHot, time_s + kHappened_s);
+      break;
+    case ThermalEventKind::kSolidBurn:
+      Raise(Prompt::kOrganBurnt, time_s + kHappened_s);
       break;
     case ThermalEventKind::kUreterInjury:
     case ThermalEventKind::kNerveInjury:

@@ -30,8 +30,9 @@ DamageMap::DamageMap(const SheetLine& line, double margin_m, double texel_m)
 
 void DamageMap::Add(const TemperaturePatch& patch) {
   constexpr std::size_t kEdge = kPatchTexels;
-  if (line_.empty() || patch.texels.size() != kTexelBytes * kEdge * kEdge ||
-      patch.header.origin_x > kAtlasTexels - kPatchTexels || patch.header.origin_y > kAtlasTexels - kPatchTexels) {
+  if (line_.empty() || patch.header.surface != BurntSurface::kMembrane ||
+      patch.texels.size() != kTexelBytes * kEdge * kEdge || patch.header.origin_x > kAtlasTexels - kPatchTexels ||
+      patch.header.origin_y > kAtlasTexels - kPatchTexels) {
     return;
   }
   if (damaged_.empty()) damaged_.assign(std::size_t{kAtlasTexels} * kAtlasTexels / 8, 0);

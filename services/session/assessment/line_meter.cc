@@ -58,7 +58,7 @@ LineMeter::Finding LineMeter::Add(const HookSample& contact) {
   const double dt_s = continues ? time_s - last_s_ : 0;
   last_s_ = time_s;
   const bool energised = contact.energised;
-  if (energised && !contact.touching) {
+  if (energised && !contact.touching && !contact.on_solid) {
     pedal_without_contact_s_ += dt_s;
     dry_s_ += dt_s;
     finding.pedal_without_contact = dry_s_ > kDryPrompt_s;

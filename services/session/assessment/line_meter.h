@@ -32,9 +32,10 @@ class SheetLine {
 /// Place of a CauteryContact, and whether a pedal was down at its time.
 struct HookSample {
   double time_s = 0;
-  bool touching = false;
+  bool touching = false;  ///< The membrane; `material` is its place there.
   Vec2f material = Vec2f::Zero();
   bool energised = false;
+  bool on_solid = false;  ///< It touches a solid instead.
 };
 
 /// Takes each sample in order.

@@ -54,6 +54,8 @@ Names NamesOf(ThermalEventKind kind) {
       return {"nerve_injury", "Nerve injury"};
     case ThermalEventKind::kQuarantine:
       return {"region_reset", "Region reset"};
+    case ThermalEventKind::kSolidBurn:
+      return {"organ_burn", "Organ burnt"};
   }
   return {"unknown", "Unknown event"};
 }

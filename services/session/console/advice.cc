@@ -145,6 +145,10 @@ std::vector<Warning> WarningsOf(const SituationReport& situation) {
                           "Release the pedal, move the hook away, or lift the tissue off."});
     }
   }
+  if (recent(ThermalEventKind::kSolidBurn)) {
+    warnings.push_back({"danger", "The hook burns the surface of an organ.",
+                        "Release the pedal, or move the hook off the organ, unless this is meant."});
+  }
   if (!situation.bus_trouble.empty()) {
     warnings.push_back({"fault", "The console cannot join the session: " + situation.bus_trouble,
                         "Start console and session from the same installation."});

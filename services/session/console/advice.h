@@ -39,7 +39,7 @@ struct SituationReport {
   bool begun = false;
   std::vector<NodeReport> nodes;
   /// Time of the last event of each ThermalEventKind [ns]; 0: none.
-  std::array<std::int64_t, 10> events_ns{};
+  std::array<std::int64_t, kThermalEventKinds> events_ns{};
   std::string bus_trouble;
   bool insecure_link = false;  ///< The link to another host has no keys.
 };

@@ -49,6 +49,8 @@ const char* EventName(ThermalEventKind kind) {
       return "nerve injury";
     case ThermalEventKind::kQuarantine:
       return "region reset";
+    case ThermalEventKind::kSolidBurn:
+      return "organ burnt";
   }
   return "unknown";
 }

@@ -124,9 +124,9 @@ bool PassesGate(const CauteryContact& m) noexcept {
       std::all_of(b.begin(), b.end(), [](float w) { return Within(w, -kUnitTolerance, 1.0f + kUnitTolerance); });
   const bool place_is_known = m.triangle != kNoIndex && Magnitude(b[0] + b[1] + b[2] - 1.0f, kUnitTolerance);
   return IsStamp(m.stamp) && IsSessionTime(m.session_time_s) && m.tool < kMaxTools && weights_in_range &&
-         (!m.touching || place_is_known) && Magnitude(m.material, kMaxCoordinate_m) &&
-         Magnitude(m.material_rate, kMaxSpeed_m_s) && Within(m.contact_radius_m, 0.0, kMaxCoordinate_m) &&
-         m.footprint.whole();
+         (!(m.touching || m.on_solid) || place_is_known) && !(m.touching && m.on_solid) &&
+         Magnitude(m.material, kMaxCoordinate_m) && Magnitude(m.material_rate, kMaxSpeed_m_s) &&
+         Within(m.contact_radius_m, 0.0, kMaxCoordinate_m) && m.footprint.whole();
 }
 
 bool PassesGate(const TopologyState& m) noexcept {
@@ -146,8 +146,8 @@ bool PassesGate(const OpenCells& m) noexcept { return IsStamp(m.stamp) && Magnit
 bool PassesGate(const TemperaturePatch& m) noexcept {
   const TemperaturePatchHeader& h = m.header;
   constexpr std::uint32_t kLastOrigin = kAtlasTexels - kPatchTexels;
-  return IsStamp(h.stamp) && h.origin_x <= kLastOrigin && h.origin_y <= kLastOrigin &&
-         Within(h.max_temperature_C, kMinTemperature_C, kMaxTemperature_C) &&
+  return IsStamp(h.stamp) && UpTo(h.surface, BurntSurface::kSolids) && h.origin_x <= kLastOrigin &&
+         h.origin_y <= kLastOrigin && Within(h.max_temperature_C, kMinTemperature_C, kMaxTemperature_C) &&
          m.texels.size() == std::size_t{4} * kPatchTexels * kPatchTexels;
 }
 
@@ -165,7 +165,7 @@ bool PassesGate(const Picture& m) noexcept {
 }
 
 bool PassesGate(const ThermalEvent& m) noexcept {
-  return IsStamp(m.stamp) && IsSessionTime(m.session_time_s) && UpTo(m.kind, ThermalEventKind::kQuarantine) &&
+  return IsStamp(m.stamp) && IsSessionTime(m.session_time_s) && UpTo(m.kind, ThermalEventKind::kSolidBurn) &&
          Magnitude(m.material, kMaxCoordinate_m) && Within(m.temperature_C, kMinTemperature_C, kMaxTemperature_C) &&
          std::isfinite(m.value);
 }

@@ -155,6 +155,29 @@ TEST_F(PictureTest, TheMembraneIsHalfTransparent) {
   EXPECT_GT(At(without, view_.render.scope_target_W).r, 60) << "nothing lies beneath the membrane";
 }
 
+TEST_F(PictureTest, ABurntSolidIsSeenAndAnIntactPatchChangesNothing) {
+  const auto with_texels = [&](const std::array<std::uint8_t, 4>& texel) {
+    TemperaturePatch patch;
+    patch.header.surface = BurntSurface::kSolids;
+    for (int i = 0; i < kPatchTexels * kPatchTexels; ++i) {
+      patch.texels.insert(patch.texels.end(), texel.begin(), texel.end());
+    }
+    return Draw([&](LaparoscopeView* l) {
+      for (std::uint32_t y = 0; y < 4; ++y) {
+        for (std::uint32_t x = 0; x < 4; ++x) {
+          patch.header.origin_x = x * kPatchTexels;
+          patch.header.origin_y = y * kPatchTexels;
+          l->ApplyPatch(patch);
+        }
+      }
+    });
+  };
+  const Bitmap intact = with_texels({34, 0, 0, 255});
+  EXPECT_EQ(intact.rgb, Draw([](LaparoscopeView*) {}).rgb);
+  // Through the membrane, which is half transparent.
+  EXPECT_GT(MeanDifference(intact, with_texels({34, 255, 255, 255})), 1.0);
+}
+
 TEST_F(PictureTest, ASlitShowsFatBetweenBrownedEdges) {
   const SyntheticMoment moment = MakeSyntheticMoment(view_, 4.8);
   ASSERT_GE(moment.cut_path.size(), 3u);

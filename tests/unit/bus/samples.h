@@ -192,7 +192,7 @@ inline OpenCells Sample(std::uint64_t sequence) {
 template <>
 inline TemperaturePatch Sample(std::uint64_t sequence) {
   TemperaturePatch m;
-  m.header = {{sequence, 17, 7000}, 8, 3, 128, 3840, 101.5f};
+  m.header = {{sequence, 17, 7000}, 8, 3, BurntSurface::kSolids, 128, 3840, 101.5f};
   for (std::size_t i = 0; i < 4 * 256 * 256; ++i) m.texels.push_back(static_cast<std::uint8_t>(i * 3 + i / 256));
   return m;
 }

@@ -61,15 +61,16 @@ template <class T>
 requires std::is_arithmetic_v<T>
 void Get(T from, T* to) { *to = from; }
 
+/// An octet, or an unsigned short.
 template <class Enum>
 requires std::is_enum_v<Enum>
-bool Put(Enum from, std::uint8_t* to) {
-  *to = static_cast<std::uint8_t>(from);
+bool Put(Enum from, std::underlying_type_t<Enum>* to) {
+  *to = static_cast<std::underlying_type_t<Enum>>(from);
   return true;
 }
 template <class Enum>
 requires std::is_enum_v<Enum>
-void Get(std::uint8_t from, Enum* to) { *to = static_cast<Enum>(from); }
+void Get(std::underlying_type_t<Enum> from, Enum* to) { *to = static_cast<Enum>(from); }
 
 inline bool Put(const Vec2f& v, std::array<float, 2>* to) {
   *to = {v.x(), v.y()};

@@ -68,6 +68,7 @@ void PutHeader(std::uint32_t chunk, std::uint32_t frame, const TemperaturePatchH
   w.Number(header.stamp.stamp_ns);
   w.Number(header.topology_revision);
   w.Number(static_cast<std::uint8_t>(header.slot));
+  w.Number(static_cast<std::uint8_t>(header.surface));
   w.Number(static_cast<std::uint16_t>(header.origin_x));
   w.Number(static_cast<std::uint16_t>(header.origin_y));
   w.Number(std::bit_cast<std::uint32_t>(header.max_temperature_C));
@@ -79,7 +80,8 @@ void PatchSender::Encode(const TemperaturePatch& patch, const SendChunk& send) {
   const TemperaturePatchHeader& header = patch.header;
   if (header.slot >= kMostSlots || patch.texels.size() < kPatch_B) return;
   Slot& slot = slots_[header.slot];
-  if (slot.told.empty() || slot.header.origin_x != header.origin_x || slot.header.origin_y != header.origin_y) {
+  if (slot.told.empty() || slot.header.surface != header.surface || slot.header.origin_x != header.origin_x ||
+      slot.header.origin_y != header.origin_y) {
     slot.told.assign(kPatch_B, 0);
     slot.dirty.assign(kTiles, true);
   }
@@ -152,6 +154,7 @@ bool PatchReceiver::Decode(std::span<const std::uint8_t> chunk) {
   header_.stamp.stamp_ns = in.Number<std::int64_t>();
   header_.topology_revision = in.Number<std::uint64_t>();
   header_.slot = in.Number<std::uint8_t>();
+  header_.surface = static_cast<BurntSurface>(in.Number<std::uint8_t>());
   header_.origin_x = in.Number<std::uint16_t>();
   header_.origin_y = in.Number<std::uint16_t>();
   header_.max_temperature_C = std::bit_cast<float>(in.Number<std::uint32_t>());
@@ -160,7 +163,8 @@ bool PatchReceiver::Decode(std::span<const std::uint8_t> chunk) {
   texels_.clear();
   constexpr std::uint32_t kFarthest = kAtlasTexels - kPatchTexels;
   if (!in.good() || number_ == 0 || frame_ == 0 || last > 1 || header_.slot >= kMostSlots ||
-      header_.origin_x > kFarthest || header_.origin_y > kFarthest || !std::isfinite(header_.max_temperature_C)) {
+      header_.surface > BurntSurface::kSolids || header_.origin_x > kFarthest || header_.origin_y > kFarthest ||
+      !std::isfinite(header_.max_temperature_C)) {
     return false;
   }
   while (!in.empty()) {
@@ -179,7 +183,8 @@ PatchReceiver::Result PatchReceiver::Take(std::span<const std::uint8_t> chunk) {
   missing_.Note(number_);
   Slot& slot = slots_[header_.slot];
   TemperaturePatchHeader& known = slot.patch.header;
-  if (slot.newest.empty() || known.origin_x != header_.origin_x || known.origin_y != header_.origin_y) {
+  if (slot.newest.empty() || known.surface != header_.surface || known.origin_x != header_.origin_x ||
+      known.origin_y != header_.origin_y) {
     if (frame_ <= slot.passed_on) return Result::kPart;  // The patch was at another place then.
     slot.patch.texels.assign(kPatch_B, 0);
     slot.newest.assign(kTiles, 0);

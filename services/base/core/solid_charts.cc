@@ -1,0 +1,170 @@
+#include "services/base/core/solid_charts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+namespace fulcrum {
+namespace {
+
+constexpr float kLeastCosine = 0.643f;  ///< Of the angle between a triangle's normal and its chart's: 50 degrees.
+constexpr float kMostExtent_m = 0.04f;  ///< Of a chart along either axis.
+constexpr std::int32_t kBetween = 2;    ///< Texels around a chart.
+
+/// By triangle and side (corners k, k + 1): the triangle beyond; kNoIndex at a border.
+std::vector<std::array<Index, 3>> Neighbours(std::span<const Triangle> triangles) {
+  struct Side {
+    std::uint64_t edge;
+    Index triangle, side;
+  };
+  std::vector<Side> sides;
+  sides.reserve(3 * triangles.size());
+  for (Index t = 0; t < triangles.size(); ++t) {
+    for (Index k = 0; k < 3; ++k) {
+      const auto [a, b] = std::minmax(triangles[t][k], triangles[t][(k + 1) % 3]);
+      sides.push_back({std::uint64_t{a} << 32 | b, t, k});
+    }
+  }
+  std::sort(sides.begin(), sides.end(),
+            [](const Side& a, const Side& b) { return std::pair(a.edge, a.triangle) < std::pair(b.edge, b.triangle); });
+  std::vector<std::array<Index, 3>> beyond(triangles.size(), {kNoIndex, kNoIndex, kNoIndex});
+  for (std::size_t n = 0; n + 1 < sides.size(); ++n) {
+    const Side &a = sides[n], &b = sides[n + 1];
+    if (a.edge != b.edge) continue;
+    beyond[a.triangle][a.side] = b.triangle;
+    beyond[b.triangle][b.side] = a.triangle;
+  }
+  return beyond;
+}
+
+struct Box {
+  Vec2f low = Vec2f::Constant(1e9f), high = Vec2f::Constant(-1e9f);
+  [[nodiscard]] Box With(const Vec2f& p) const { return {low.cwiseMin(p), high.cwiseMax(p)}; }
+  [[nodiscard]] Vec2f extent() const { return high - low; }
+};
+
+class Cutter {
+ public:
+  explicit Cutter(const TissueScene& scene)
+      : scene_(scene), triangles_(scene.tube_surface), beyond_(Neighbours(triangles_)) {
+    for (const Triangle& t : triangles_) {
+      const Vec3f normal = (At(t[1]) - At(t[0])).cross(At(t[2]) - At(t[0]));
+      areas_.push_back(normal);  // Of twice the area.
+      normals_.push_back(normal.stableNormalized());
+    }
+  }
+
+  /// Grows a chart from each triangle that has none yet: once to find the mean normal, then along it.
+  SolidCharts Cut() {
+    SolidCharts result;
+    result.of_triangle.assign(triangles_.size(), kNoIndex);
+    for (Index seed = 0; seed < triangles_.size(); ++seed) {
+      if (result.of_triangle[seed] != kNoIndex) continue;
+      std::vector<Index> part = Grow(seed, normals_[seed], result.of_triangle).second;
+      Vec3f mean = Vec3f::Zero();
+      for (const Index t : part) mean += areas_[t];
+      // The seed itself must be part of its chart.
+      if (normals_[seed].dot(mean.stableNormalized()) < kLeastCosine) mean = areas_[seed];
+      auto [chart, own] = Grow(seed, mean.stableNormalized(), result.of_triangle);
+      for (const Index t : own) result.of_triangle[t] = static_cast<Index>(result.charts.size());
+      result.charts.push_back(chart);
+    }
+    return result;
+  }
+
+ private:
+  [[nodiscard]] const Vec3f& At(Index vertex) const { return scene_.rest_position[vertex]; }
+
+  std::pair<SolidChart, std::vector<Index>> Grow(Index seed, const Vec3f& normal, const std::vector<Index>& taken) {
+    SolidChart chart;
+    const Vec3f n = normal.isZero() ? Vec3f(Vec3f::UnitZ()) : normal;
+    chart.s_axis = n.unitOrthogonal();
+    chart.t_axis = n.cross(chart.s_axis);
+    std::vector<Index> part{seed};
+    std::vector<std::uint8_t>& seen = seen_;
+    seen.assign(triangles_.size(), 0);
+    seen[seed] = 1;
+    Box box = With(Box{}, chart, seed);
+    for (std::size_t next = 0; next < part.size(); ++next) {
+      for (const Index t : beyond_[part[next]]) {
+        if (t == kNoIndex || seen[t] != 0 || taken[t] != kNoIndex || normals_[t].dot(n) < kLeastCosine) continue;
+        seen[t] = 1;
+        const Box larger = With(box, chart, t);
+        if (larger.extent().maxCoeff() > kMostExtent_m) continue;
+        box = larger;
+        part.push_back(t);
+      }
+    }
+    chart.shift = -box.low;
+    const auto texels = [](float length) { return static_cast<std::int32_t>(std::ceil(length / kSolidCell_m)) + 1; };
+    chart.width = texels(box.extent().x());
+    chart.height = texels(box.extent().y());
+    return {chart, std::move(part)};
+  }
+  [[nodiscard]] Box With(Box box, const SolidChart& chart, Index triangle) const {
+    for (const Index v : triangles_[triangle]) box = box.With({chart.s_axis.dot(At(v)), chart.t_axis.dot(At(v))});
+    return box;
+  }
+
+  const TissueScene& scene_;
+  std::span<const Triangle> triangles_;
+  std::vector<std::array<Index, 3>> beyond_;
+  std::vector<Vec3f> areas_, normals_;
+  std::vector<std::uint8_t> seen_;
+};
+
+/// Puts the charts into rows, the tallest first. Those that do not fit lose their triangles.
+void Pack(SolidCharts* all) {
+  std::vector<SolidChart>& charts = all->charts;
+  std::vector<Index> order(charts.size());
+  std::iota(order.begin(), order.end(), Index{0});
+  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return charts[a].height > charts[b].height; });
+  double area = 0;
+  std::int32_t widest = 0;
+  for (const SolidChart& chart : charts) {
+    area += static_cast<double>(chart.width + 2 * kBetween) * static_cast<double>(chart.height + 2 * kBetween);
+    widest = std::max(widest, chart.width + 2 * kBetween);
+  }
+  const auto square = static_cast<std::int32_t>(std::ceil(std::sqrt(1.1 * area)));
+  const std::int32_t limit = std::min(std::max(square, widest), kAtlasTexels);
+  std::int32_t x = 0, y = 0, tallest = 0;
+  std::vector<std::uint8_t> left_out(charts.size(), 0);
+  for (const Index index : order) {
+    SolidChart& chart = charts[index];
+    const std::int32_t width = chart.width + 2 * kBetween, height = chart.height + 2 * kBetween;
+    if (x + width > limit) {
+      x = 0;
+      y += tallest;
+      tallest = 0;
+    }
+    left_out[index] = y + height > kAtlasTexels || width > kAtlasTexels ? 1 : 0;
+    if (left_out[index] != 0) continue;
+    chart.x = x + kBetween;
+    chart.y = y + kBetween;
+    chart.shift += kSolidCell_m * Vec2f(static_cast<float>(chart.x), static_cast<float>(chart.y));
+    x += width;
+    tallest = std::max(tallest, height);
+    all->width = std::max(all->width, x);
+    all->height = std::max(all->height, y + height);
+  }
+  for (Index& chart : all->of_triangle) {
+    if (chart != kNoIndex && left_out[chart] != 0) chart = kNoIndex;
+  }
+}
+
+}  // namespace
+
+SolidCharts MakeSolidCharts(const TissueScene& scene) {
+  SolidCharts charts = Cutter(scene).Cut();
+  Pack(&charts);
+  return charts;
+}
+
+bool SolidsBurn(const TissueScene& scene) {
+  return !scene.tube_surface.empty() && scene.thermal.model != ThermalModel::kPaper &&
+         FindTool(scene.tools, ToolKind::kHook).has_value();
+}
+
+}  // namespace fulcrum

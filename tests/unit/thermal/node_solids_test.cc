@@ -1,0 +1,149 @@
+// The thermal node and the surface of a solid: patches, events, Health and state over a restart.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "tests/unit/thermal/node_fixture.h"
+
+namespace fulcrum::thermal {
+namespace {
+
+/// The flat membrane, and 20 mm beneath it a plate of 40 x 30 mm.
+class NodeOverSolid : public ThermalNodeTest {
+ protected:
+  NodeOverSolid() {
+    const auto first = static_cast<Index>(data_.rest_position.size());
+    for (const Vec3f& p :
+         {Vec3f(0, 0, -0.02f), Vec3f(0.04f, 0, -0.02f), Vec3f(0.04f, 0.03f, -0.02f), Vec3f(0, 0.03f, -0.02f)}) {
+      data_.rest_position.push_back(p);
+    }
+    data_.tube_surface = {{first, first + 1, first + 2}, {first, first + 2, first + 3}};
+    data_.fixed.tools[0].kind = ToolKind::kHook;
+    scene_ = data_.View();
+    chart_ = MakeSolidCharts(scene_).charts.at(0);
+  }
+
+  /// One tick with energised metal on the plate at (x, 15 mm).
+  void Burn(ThermalNode* node, float x, CauteryMode mode = CauteryMode::kCoag, float power_W = 30) {
+    const double time_s = tick_.session_time_s;
+    bus_.Demand(mode, power_W, std::max(std::llround(1e9 * time_s) - 1000, 0LL));
+    CauteryContact contact = TouchAt(chart_.Material({x, 0.015f, -0.02f}), 5e-4f);
+    contact.touching = false;
+    contact.on_solid = true;
+    contact.session_time_s = time_s;
+    contact.stamp = {++sequence_, 1, tick_.stamp_ns};
+    ASSERT_TRUE(bus_.contact_out->Write(contact));
+    Step(node);
+  }
+  [[nodiscard]] static double MetricOf(const ThermalNode& node, const std::string& name) {
+    Health health;
+    node.FillHealth(&health);
+    EXPECT_LE(health.metrics.size(), bus::kMaxMetrics);
+    for (const Metric& metric : health.metrics) {
+      if (metric.name == name) return metric.value;
+    }
+    return std::nan("");
+  }
+
+  SolidChart chart_;
+};
+
+TEST_F(NodeOverSolid, ABurnGivesAPatchOfItsOwnAtlasAndAnEvent) {
+  auto node = MakeNode();
+  auto patches = bus_.patches.MakeInput(256);
+  for (int n = 0; n < 150; ++n) Burn(node.get(), 0.02f);
+  for (int n = 0; n < 10; ++n) Step(node.get());
+  EXPECT_GT(MetricOf(*node, "solid_burn_mm2"), 1.0);
+  EXPECT_GT(MetricOf(*node, "highest_temperature_C"), 90.0);
+  EXPECT_EQ(MetricOf(*node, "cut_length_mm"), 0.0);
+  EXPECT_GT(MetricOf(*node, "delivered_J"), 2.0);
+  EXPECT_LT(MetricOf(*node, "energy_closure"), 1e-3);
+  EXPECT_EQ(node->solver().topology().revision(), 0u);
+
+  int burns = 0;
+  ThermalEvent event;
+  while (bus_.event_in->TakeNext(&event)) {
+    if (event.kind != ThermalEventKind::kSolidBurn) continue;
+    ++burns;
+    EXPECT_LT((event.material - chart_.Material({0.02f, 0.015f, -0.02f})).norm(), 2e-3f);
+    EXPECT_GE(event.value, 1e-6f);
+  }
+  EXPECT_GE(burns, 1);
+
+  const Vec2f at = chart_.Material({0.02f, 0.015f, -0.02f}) / kSolidCell_m;
+  int of_solids = 0;
+  TemperaturePatch patch, last;
+  while (patches->TakeNext(&patch)) {
+    if (patch.header.surface != BurntSurface::kSolids) continue;
+    ++of_solids;
+    EXPECT_GE(patch.header.slot, kPatchSlots);
+    const bool contains = at.x() >= static_cast<float>(patch.header.origin_x) &&
+                          at.x() < static_cast<float>(patch.header.origin_x + kPatchTexels) &&
+                          at.y() >= static_cast<float>(patch.header.origin_y) &&
+                          at.y() < static_cast<float>(patch.header.origin_y + kPatchTexels);
+    if (contains) last = patch;
+  }
+  ASSERT_GT(of_solids, 5);
+  ASSERT_FALSE(last.texels.empty());
+  const auto x = static_cast<std::size_t>(at.x()) - last.header.origin_x;
+  const auto y = static_cast<std::size_t>(at.y()) - last.header.origin_y;
+  EXPECT_GT(last.texels[4 * (y * kPatchTexels + x) + 1], 200) << "damage beneath the metal";
+}
+
+TEST_F(NodeOverSolid, TheBurnOutlivesARestart) {
+  OpenCheckpoint();
+  auto node = MakeNode();
+  for (int n = 0; n < 60; ++n) Burn(node.get(), 0.02f);
+  const std::uint64_t hash = NewestManifest().state_hash;
+  const float before = node->solids()->dead_m2();
+  ASSERT_GT(before, 0.0f);
+  node.reset();
+  OpenCheckpoint();
+  node = MakeNode();
+  ASSERT_TRUE(node->restored());
+  EXPECT_NEAR(node->solids()->dead_m2(), before, 0.2f * before);
+  EXPECT_GT(node->solids()->field().MaxTheta(), 20.0f);
+  for (int n = 0; n < 20; ++n) Burn(node.get(), 0.02f);
+  EXPECT_NE(NewestManifest().state_hash, hash);
+  EXPECT_GE(node->solids()->dead_m2(), before);
+}
+
+TEST_F(NodeOverSolid, MembraneAndSolidInTurnAreTwoPaths) {
+  auto node = MakeNode();
+  // The places are close in both materials, so a path from one to the other would be no jump.
+  for (int n = 0; n < 40; ++n) {
+    Cut(node.get(), 0.020f, 0.0201f);
+    Burn(node.get(), 0.02f, CauteryMode::kCut, 35);
+  }
+  EXPECT_LT(MetricOf(*node, "cut_length_mm"), 2.0);
+  EXPECT_LT(MetricOf(*node, "energy_closure"), 1e-3);
+}
+
+TEST_F(NodeOverSolid, WithoutContactTheStateHashIsThatOfTheMembraneAlone) {
+  auto node = MakeNode();
+  Cut(node.get(), 0.010f, 0.014f);
+  EXPECT_EQ(NewestManifest().state_hash, node->solver().TickHash());
+  for (int n = 0; n < 20; ++n) Burn(node.get(), 0.02f);
+  EXPECT_NE(NewestManifest().state_hash, node->solver().TickHash());
+}
+
+TEST_F(NodeOverSolid, BadSamplesAreRefusedAndCounted) {
+  auto node = MakeNode();
+  CauteryContact contact = TouchAt({1.5f, 0.1f}, 5e-4f);
+  contact.touching = false;
+  contact.on_solid = true;
+  for (const Vec2f& at : {Vec2f(1.5f, 0.1f), Vec2f(-0.01f, 0.01f), Vec2f(0.0f, 0.0f)}) {
+    contact.material = at;
+    contact.stamp = {++sequence_, 1, tick_.stamp_ns};
+    ASSERT_TRUE(bus_.contact_out->Write(contact));
+    Step(node.get());
+  }
+  Cut(node.get(), 0.010f, 0.011f);  // For Health.
+  EXPECT_EQ(MetricOf(*node, "contacts_refused"), 3.0);
+  EXPECT_EQ(MetricOf(*node, "solid_burn_mm2"), 0.0);
+}
+
+}  // namespace
+}  // namespace fulcrum::thermal

@@ -1,0 +1,93 @@
+// Burns on the surface of the solids: the layer beneath the hook as cells of the solids' charts, with the same current,
+// heat, boiling and damage as the membrane. Nothing is cut: what vaporises leaves a pit as deep as the layer.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "services/base/core/scene_view.h"
+#include "services/base/core/solid_charts.h"
+#include "thermal_node/coupling/source_window.h"
+#include "thermal_node/coupling/tip_tracker.h"
+#include "thermal_node/damage/arrhenius.h"
+#include "thermal_node/heat/heat_field.h"
+
+namespace fulcrum::thermal {
+
+/// Depth of the layer, assumed: what a disc of 1 mm heats first.
+inline constexpr float kSolidLayer_m = 5e-4f;
+/// Depth at which the potential beneath has fallen to 0; far beyond the metal's radius it hardly matters. Assumed.
+inline constexpr float kSolidDepth_m = 0.01f;
+/// Radius of the hot disc from which heat flows into the depth: the mean conductance of a disc at one temperature on a
+/// half space is 4 k / (pi a) (Carslaw and Jaeger 1959, section 8.2).
+inline constexpr float kSolidDisc_m = 1e-3f;
+
+/// The material of the layer: the wall of the rectum (volume/volume_material.h) with the electrical conductivity of the
+/// scene's membrane in every depth, since serosa covers most organs.
+[[nodiscard]] Material MakeSolidMaterial(const ThermalParams& params);
+
+struct SolidBurn {
+  Vec2f material = Vec2f::Zero();  ///< Where, in the charts [m].
+  float temperature_C = 0;         ///< Highest there.
+  float dead_m2 = 0;               ///< Area of dead surface since the start.
+};
+
+class SolidSurface {
+ public:
+  explicit SolidSurface(const TissueScene& scene);
+  SolidSurface(const SolidSurface&) = delete;  // members hold references to each other
+  SolidSurface& operator=(const SolidSurface&) = delete;
+
+  /// Advances one frame; `hook`: state of the metal, which the membrane shares. Returns false after a few comparisons
+  /// if there is neither current nor warm tissue.
+  bool Step(std::span<const TipInput> tips, float dt_s, Interface* hook);
+
+  /// Chart of a triangle of the solids' surface; kNoIndex: none.
+  [[nodiscard]] Index ChartOf(Index triangle) const {
+    return triangle < chart_of_.size() ? chart_of_[triangle] : kNoIndex;
+  }
+  [[nodiscard]] const HeatField& field() const { return field_; }
+  [[nodiscard]] HeatField* mutable_field() { return &field_; }
+  [[nodiscard]] const Ledger& ledger() const { return ledger_; }
+  /// Power that the generator delivers to solids, mean over the last frame [W].
+  [[nodiscard]] float power_W() const { return power_W_; }
+  [[nodiscard]] float voltage_V() const { return power_W_ > 0 ? source_.stats().voltage_V : 0.0f; }
+  [[nodiscard]] float highest_C() const { return highest_C_; }
+  /// Area of dead surface (cell death, Omega >= 1) since the start [m^2]; updated every tenth frame.
+  [[nodiscard]] float dead_m2() const { return dead_m2_; }
+  /// A burn to be reported: at the first square millimetre of an application, and with each further one.
+  [[nodiscard]] const std::optional<SolidBurn>& burn() const { return burn_; }
+
+  /// Hash of sums over the warm state; 0 while nothing has been heated since the start.
+  [[nodiscard]] std::uint64_t TickHash() const;
+
+  // Checkpoints (coupling/checkpoint_state.cc). A state that was never heated takes a few bytes.
+  [[nodiscard]] static std::size_t CheckpointCapacity();
+  /// Returns the bytes used; 0 when `out` is too small.
+  [[nodiscard]] std::size_t Save(std::span<std::byte> out) const;
+  /// Returns false, and leaves a fresh state, if no solver can have written the bytes.
+  [[nodiscard]] bool Restore(std::span<const std::byte> bytes);
+  /// Back to tissue that was never heated.
+  void Clear();
+
+ private:
+  struct Record;
+  SolidSurface(const TissueScene& scene, SolidCharts charts);
+  void ApplySource(std::span<const TipInput> tips, float dt_s, float from, float to);
+  void MeasureBurn(std::span<const TipInput> tips);
+
+  ThermalParams params_;
+  Material material_;
+  HeatField field_;
+  DamageModel damage_;
+  SourceWindow source_;
+  std::vector<Index> chart_of_;  ///< By triangle.
+  Ledger ledger_;
+  std::optional<SolidBurn> burn_;
+  std::uint64_t frame_ = 0;  ///< Frames in which something was computed.
+  float power_W_ = 0, highest_C_ = 0, dead_m2_ = 0, reported_m2_ = 0;
+};
+
+}  // namespace fulcrum::thermal
