@@ -28,7 +28,7 @@ class Dataset:
         return np.where(raw > 0, raw * self.calibration["depth_unit_m"], np.nan)
 
     def temperature_C(self, frame):
-        """Temperature of the sheet; NaN elsewhere."""
+        """Temperature of the sheet and of burnt solids; NaN elsewhere."""
         raw = self.image("temperature", frame).astype(np.float64)
         return np.where(raw > 0, raw * self.calibration["temperature_unit_C"], np.nan)
 

@@ -29,12 +29,22 @@ AtlasRect Intersection(const AtlasRect& a, const AtlasRect& b) {
 
 }  // namespace
 
-AtlasRect SolidBurn::Apply(const TemperaturePatch& patch) {
-  if (patch.header.surface != BurntSurface::kSolids || patch.texels.size() != 4u * kPatchTexels * kPatchTexels ||
-      patch.header.origin_x >= kAtlasTexels || patch.header.origin_y >= kAtlasTexels) {
-    return {};
+BurnAtlas::BurnAtlas(const SolidCharts& charts, float body_temperature_C) : boxes_(charts.charts.size()) {
+  const auto rounded = [](std::int32_t texels) { return (texels + kRoundedTo - 1) / kRoundedTo * kRoundedTo; };
+  width_ = rounded(charts.width);
+  height_ = rounded(charts.height);
+  intact_ = {static_cast<std::uint8_t>(std::lround((body_temperature_C - 20.0f) * 2)), 0, 0, 255};
+  texels_.resize(4 * static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  for (std::size_t i = 0; i < texels_.size(); i += 4) std::memcpy(texels_.data() + i, intact_.data(), 4);
+  // Charts that have no place because the atlas was full have no triangles, and keep an empty box.
+  for (const Index index : charts.of_triangle) {
+    if (index == kNoIndex) continue;
+    const SolidChart& chart = charts.charts[index];
+    boxes_[index] = {chart.x, chart.y, chart.width, chart.height};
   }
-  if (!charts_) Prepare();
+}
+
+AtlasRect BurnAtlas::Copy(const TemperaturePatch& patch) {
   const int x = static_cast<int>(patch.header.origin_x), y = static_cast<int>(patch.header.origin_y);
   const AtlasRect rect = Intersection({x, y, kPatchTexels, kPatchTexels}, {0, 0, width_, height_});
   if (rect.empty()) return {};
@@ -42,36 +52,38 @@ AtlasRect SolidBurn::Apply(const TemperaturePatch& patch) {
     std::memcpy(texels_.data() + 4 * TexelIndex(x, y + row, width_),
                 patch.texels.data() + 4 * TexelIndex(0, row, kPatchTexels), 4 * static_cast<std::size_t>(rect.width));
   }
-  const std::vector<SolidChart>& charts = charts_->charts;
-  for (Index i = 0; i < charts.size(); ++i) {
-    if (added_[i] != 0) continue;
-    const SolidChart& chart = charts[i];
-    if (ShowsBurn(Intersection(rect, {chart.x, chart.y, chart.width, chart.height}))) AddChart(i);
+  return rect;
+}
+
+std::optional<BurnAtlas::Texel> BurnAtlas::At(Index chart, const Vec2f& material) const {
+  if (chart >= boxes_.size()) return std::nullopt;
+  const AtlasRect& box = boxes_[chart];
+  const int x = static_cast<int>(std::floor(material.x() / kSolidCell_m));
+  const int y = static_cast<int>(std::floor(material.y() / kSolidCell_m));
+  if (x < box.x || y < box.y || x >= box.x + box.width || y >= box.y + box.height) return std::nullopt;
+  Texel texel;
+  std::memcpy(texel.data(), texels_.data() + 4 * TexelIndex(x, y, width_), 4);
+  return texel;
+}
+
+AtlasRect SolidBurn::Apply(const TemperaturePatch& patch) {
+  if (patch.header.surface != BurntSurface::kSolids || patch.texels.size() != 4u * kPatchTexels * kPatchTexels ||
+      patch.header.origin_x >= kAtlasTexels || patch.header.origin_y >= kAtlasTexels) {
+    return {};
+  }
+  if (!charts_) Prepare();
+  const AtlasRect rect = atlas_.Copy(patch);
+  if (rect.empty()) return {};
+  for (Index i = 0; i < added_.size(); ++i) {
+    if (added_[i] == 0 && ShowsBurn(Intersection(rect, atlas_.boxes()[i]))) AddChart(i);
   }
   return rect;
 }
 
 void SolidBurn::Prepare() {
   charts_ = MakeSolidCharts(scene_);
-  const auto rounded = [](std::int32_t texels) { return (texels + kRoundedTo - 1) / kRoundedTo * kRoundedTo; };
-  width_ = rounded(charts_->width);
-  height_ = rounded(charts_->height);
-  texels_.resize(4 * static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
-  const auto body = static_cast<std::uint8_t>(std::lround((scene_.thermal.body_temperature_C - 20.0f) * 2));
-  for (std::size_t i = 0; i < texels_.size(); i += 4) {
-    texels_[i] = body;
-    texels_[i + 1] = 0;
-    texels_[i + 2] = 0;
-    texels_[i + 3] = 255;
-  }
+  atlas_ = BurnAtlas(*charts_, scene_.thermal.body_temperature_C);
   added_.assign(charts_->charts.size(), 0);
-  // The atlas was full: such charts have no place in it.
-  std::vector<std::uint8_t> placed(added_.size(), 0);
-  for (const Index chart : charts_->of_triangle) {
-    if (chart != kNoIndex) placed[chart] = 1;
-  }
-  for (std::size_t i = 0; i < added_.size(); ++i) added_[i] = placed[i] != 0 ? 0 : 1;
-
   rest_.resize(scene_.surface_vertices.size());
   chart_of_.assign(rest_.size(), kNotSearched);
   if (!rest_.empty()) {
@@ -85,7 +97,7 @@ void SolidBurn::Prepare() {
 bool SolidBurn::ShowsBurn(const AtlasRect& rect) const {
   for (int y = rect.y; y < rect.y + rect.height; ++y) {
     for (int x = rect.x; x < rect.x + rect.width; ++x) {
-      const std::uint8_t* texel = texels_.data() + 4 * TexelIndex(x, y, width_);
+      const std::uint8_t* texel = atlas_.texels().data() + 4 * TexelIndex(x, y, atlas_.width());
       if (texel[1] >= kVisibleDamage || texel[2] >= kVisibleDryness || texel[3] < 128) return true;
     }
   }
@@ -159,6 +171,7 @@ void SolidBurn::AddChart(Index index) {
         corner = static_cast<Index>(vertices_.size());
         vertices_.push_back(t[k]);
         materials_.push_back(chart.Material(rest_[t[k]]));
+        chart_of_corner_.push_back(index);
         boxes_.push_back(box);
       }
       added[k] = corner;

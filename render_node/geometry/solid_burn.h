@@ -17,6 +17,38 @@
 
 namespace fulcrum::render {
 
+/// Thermal state of the solids' charts, four bytes a texel as in a TemperaturePatch. A copy keeps that of its moment.
+class BurnAtlas {
+ public:
+  using Texel = std::array<std::uint8_t, 4>;
+
+  BurnAtlas() = default;
+  /// Intact tissue at this temperature everywhere.
+  BurnAtlas(const SolidCharts& charts, float body_temperature_C);
+
+  /// Copies the part of the patch that lies within the atlas. Returns the changed rectangle.
+  /// @pre the patch has the right size and begins within 4096 x 4096 texels.
+  AtlasRect Copy(const TemperaturePatch& patch);
+
+  /// Texel of a chart at (s, t) [m]; no value outside the chart's box, where those of other charts lie.
+  [[nodiscard]] std::optional<Texel> At(Index chart, const Vec2f& material) const;
+  /// What texels are before the first patch.
+  [[nodiscard]] const Texel& intact() const { return intact_; }
+
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] int height() const { return height_; }
+  /// 4 * width * height bytes, row by row, t slow and s fast.
+  [[nodiscard]] std::span<const std::uint8_t> texels() const { return texels_; }
+  /// By chart; empty: it has no place because the atlas was full.
+  [[nodiscard]] std::span<const AtlasRect> boxes() const { return boxes_; }
+
+ private:
+  int width_ = 0, height_ = 0;
+  Texel intact_{};
+  std::vector<std::uint8_t> texels_;
+  std::vector<AtlasRect> boxes_;
+};
+
 class SolidBurn {
  public:
   /// Computes nothing. The arrays of `scene` must outlive it.
@@ -31,6 +63,8 @@ class SolidBurn {
   [[nodiscard]] std::span<const Index> vertices() const { return vertices_; }
   /// By corner: (s, t) in the charts [m].
   [[nodiscard]] std::span<const Vec2f> materials() const { return materials_; }
+  /// By corner: its chart.
+  [[nodiscard]] std::span<const Index> charts() const { return chart_of_corner_; }
   /// By corner: lowest and highest (s, t) of its chart [m]. Beyond lie texels of other charts.
   [[nodiscard]] std::span<const std::array<float, 4>> boxes() const { return boxes_; }
   /// By their corners. Charts share no corners, and a triangle over the border of two charts is there for each.
@@ -38,10 +72,8 @@ class SolidBurn {
   /// Grows whenever triangles are added.
   [[nodiscard]] std::uint64_t additions() const { return additions_; }
 
-  [[nodiscard]] int width() const { return width_; }    ///< Of the atlas [texels]; 0 before the first patch.
-  [[nodiscard]] int height() const { return height_; }  ///< The same.
-  /// 4 * width * height bytes as in a patch, row by row; they keep their place from the first patch on.
-  [[nodiscard]] std::span<const std::uint8_t> texels() const { return texels_; }
+  /// Empty before the first patch. Its texels keep their place in memory from then on.
+  [[nodiscard]] const BurnAtlas& atlas() const { return atlas_; }
 
  private:
   /// The surfaces of one solid.
@@ -65,10 +97,10 @@ class SolidBurn {
   std::vector<Vec3f> rest_;                    // Of the drawn vertices [m].
   std::vector<Index> chart_of_;                // Of the drawn vertices, as far as known.
   std::vector<std::uint8_t> added_;            // By chart.
-  int width_ = 0, height_ = 0;
-  std::vector<std::uint8_t> texels_;
+  BurnAtlas atlas_;
   std::vector<Index> vertices_;
   std::vector<Vec2f> materials_;
+  std::vector<Index> chart_of_corner_;
   std::vector<std::array<float, 4>> boxes_;
   std::vector<Triangle> triangles_;
   std::uint64_t additions_ = 0;

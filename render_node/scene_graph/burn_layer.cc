@@ -22,8 +22,8 @@ bool BurnLayer::Apply(const TemperaturePatch& patch, osg::Geode* parent) {
   if (texture_) {
     texture_->Update(rect);
   } else if (grown()) {
-    texture_ = std::make_unique<AtlasTexture>(burn_.width(), burn_.height(), burn_.texels());
-    mesh_ = MakeMesh(*texture_, burn_.width(), burn_.height());
+    texture_ = std::make_unique<AtlasTexture>(atlas().width(), atlas().height(), atlas().texels());
+    mesh_ = MakeMesh(*texture_, atlas().width(), atlas().height());
     parent->addDrawable(mesh_->geometry());
   }
   return true;
@@ -85,7 +85,10 @@ void BurnLayer::Update(std::span<const Vec3f> positions, std::span<const Vec3f> 
     shown_additions_ = burn_.additions();
     std::vector<std::array<float, 4>> coordinates;
     coordinates.reserve(vertices.size());
-    for (const Vec2f& m : burn_.materials()) coordinates.push_back({m.x(), m.y(), 0, 0});
+    for (std::size_t k = 0; k < vertices.size(); ++k) {
+      const Vec2f& m = burn_.materials()[k];
+      coordinates.push_back({m.x(), m.y(), static_cast<float>(burn_.charts()[k]), 0});
+    }
     mesh_->SetCoordinates(coordinates);
     mesh_->SetColours(burn_.boxes());
   }

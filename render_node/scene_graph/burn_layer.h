@@ -33,6 +33,7 @@ class BurnLayer {
   [[nodiscard]] bool grown() const { return burn_.additions() != shown_additions_; }
   /// Places the mesh on the solids. Positions, frame W [m], and normals by SceneView::surface_vertices.
   void Update(std::span<const Vec3f> positions, std::span<const Vec3f> normals, FieldOfView* field);
+  [[nodiscard]] const BurnAtlas& atlas() const { return burn_.atlas(); }
 
  private:
   [[nodiscard]] std::unique_ptr<Mesh> MakeMesh(const AtlasTexture& texture, int width, int height);

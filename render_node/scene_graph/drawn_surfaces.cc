@@ -9,6 +9,7 @@
 #include <osg/Geometry>
 #include <osg/MatrixTransform>
 #include <osg/NodeVisitor>
+#include <span>
 #include <string_view>
 #include <utility>
 
@@ -19,10 +20,13 @@ namespace {
 
 constexpr std::array<std::string_view, 11> kSurfaces{
     "rectum", "organ", "fat", "membrane", "surroundings", "breathing", "hook", "grasper", "jaw", "blade", "instrument"};
+constexpr std::array<std::string_view, 1> kBurns{"burn"};
 
 class Collector final : public osg::NodeVisitor {
  public:
-  Collector() : osg::NodeVisitor(TRAVERSE_ALL_CHILDREN) {}
+  /// @param names of the surfaces that are collected; they must outlive it.
+  explicit Collector(std::span<const std::string_view> names)
+      : osg::NodeVisitor(TRAVERSE_ALL_CHILDREN), names_(names) {}
 
   void apply(osg::Camera& camera) override { traverse(camera); }  // Its matrix is no place of its content.
   void apply(osg::MatrixTransform& transform) override {
@@ -35,7 +39,7 @@ class Collector final : public osg::NodeVisitor {
     tool_ = tool;
   }
   void apply(osg::Geometry& geometry) override {
-    if (std::find(kSurfaces.begin(), kSurfaces.end(), geometry.getName()) == kSurfaces.end()) return;
+    if (std::find(names_.begin(), names_.end(), geometry.getName()) == names_.end()) return;
     DrawnSurface surface;
     surface.name = geometry.getName();
     surface.tool = tool_;
@@ -73,6 +77,7 @@ class Collector final : public osg::NodeVisitor {
     }
   }
 
+  std::span<const std::string_view> names_;
   osg::Matrix place_;
   int tool_ = -1;
   std::map<std::pair<std::string, int>, int> parts_;
@@ -81,9 +86,16 @@ class Collector final : public osg::NodeVisitor {
 }  // namespace
 
 std::vector<DrawnSurface> DrawnSurfaces(osg::Node* root) {
-  Collector collector;
+  Collector collector(kSurfaces);
   root->accept(collector);
   return std::move(collector.surfaces);
+}
+
+std::optional<DrawnSurface> DrawnBurn(osg::Node* root) {
+  Collector collector(kBurns);
+  root->accept(collector);
+  if (collector.surfaces.empty() || collector.surfaces.front().triangles.empty()) return std::nullopt;
+  return std::move(collector.surfaces.front());
 }
 
 }  // namespace fulcrum::render

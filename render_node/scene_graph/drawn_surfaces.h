@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <osg/Node>
 #include <string>
 #include <vector>
@@ -14,7 +15,7 @@ namespace fulcrum::render {
 
 struct DrawnSurface {
   std::string name;  ///< "rectum", "organ" (a solid of another look), "fat", "membrane", "surroundings", "breathing",
-                     ///< or the part of a tool.
+                     ///< "burn", or the part of a tool.
   int tool = -1;     ///< Tool that it is part of; -1: tissue.
   int part = 0;      ///< Counts the surfaces of one name and tool.
   std::vector<Vec3d> positions_W;
@@ -24,7 +25,12 @@ struct DrawnSurface {
   bool cull_back = false;
 };
 
-/// Surfaces below `root` (LaparoscopeView::root()) as of its last Update(); effects, text and the mask are left out.
+/// Surfaces below `root` (LaparoscopeView::root()) as of its last Update(); effects, the burns of solids, text and the
+/// mask are left out.
 [[nodiscard]] std::vector<DrawnSurface> DrawnSurfaces(osg::Node* root);
+
+/// The mesh that is laid over the solids where their charts have burns, with the triangles of the solids themselves.
+/// Its coordinates are (s, t) in the charts [m] and the number of the chart. None while no burnt chart is in the field.
+[[nodiscard]] std::optional<DrawnSurface> DrawnBurn(osg::Node* root);
 
 }  // namespace fulcrum::render

@@ -323,6 +323,7 @@ bool LaparoscopeView::HazeHasChanged(double session_time_s) const {
 }
 
 const Atlas& LaparoscopeView::atlas() const { return impl_->atlas; }
+const BurnAtlas& LaparoscopeView::burn_atlas() const { return impl_->layers.burn_atlas(); }
 osg::Group* LaparoscopeView::root() const { return impl_->root; }
 const Laparoscope& LaparoscopeView::laparoscope() const { return impl_->scope; }
 

@@ -8,6 +8,7 @@
 #include "render_node/geometry/atlas.h"
 #include "render_node/geometry/laparoscope.h"
 #include "render_node/geometry/look.h"
+#include "render_node/geometry/solid_burn.h"
 #include "render_node/scene_graph/overlay.h"
 #include "services/base/core/scene_view.h"
 
@@ -68,6 +69,8 @@ class LaparoscopeView {
 
   /// The sheet's thermal state as drawn.
   [[nodiscard]] const Atlas& atlas() const;
+  /// The same of the solids; empty before their first patch.
+  [[nodiscard]] const BurnAtlas& burn_atlas() const;
   [[nodiscard]] osg::Group* root() const;
   [[nodiscard]] const Laparoscope& laparoscope() const;
   /// Present position, frame W, of the sheet's node nearest to (s, t) [m].

@@ -44,6 +44,7 @@ class TissueLayers {
   bool Update();
 
   [[nodiscard]] const MembraneMesh& membrane() const { return membrane_; }
+  [[nodiscard]] const BurnAtlas& burn_atlas() const { return burn_.atlas(); }
   [[nodiscard]] std::span<const float> particles() const { return xyz_; }  ///< Last argument of SetTissue.
   [[nodiscard]] osg::Geode* node() const { return geode_; }
 

@@ -1,6 +1,6 @@
 // Burns of a solid, laid over its own surface (rectum.frag). The colours are those of burnt peritoneum (membrane.frag);
-// what has vaporised is a shallow charred pit. coordinate: material (s, t) in the charts [m]. colour: lowest and
-// highest (s, t) of the corner's chart.
+// what has vaporised is a shallow charred pit. coordinate: material (s, t) in the charts [m]; the number of the
+// chart, the third, is for the ground truth. colour: lowest and highest (s, t) of the corner's chart.
 in vec3 position;
 in vec3 normal;
 in vec4 colour;

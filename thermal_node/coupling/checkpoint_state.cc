@@ -277,12 +277,14 @@ struct SolidSurface::Record {
   std::uint64_t layout;
   std::uint64_t frame, quarantined;
   Ledger ledger;
-  float highest_C, dead_m2, reported_m2, power_W;
+  float highest_C, power_W;
+  BySolid dead_m2, reported_m2;
   std::uint32_t tile_count, used;
 
   [[nodiscard]] bool Plausible() const {
-    return layout == kSolidLayout && used <= 1 && highest_C >= 0 && dead_m2 >= 0 && reported_m2 >= 0 &&
-           std::isfinite(highest_C + dead_m2 + reported_m2 + power_W) &&
+    constexpr float kMost_m2 = 100;
+    return layout == kSolidLayout && used <= 1 && highest_C >= 0 && std::isfinite(highest_C + power_W) &&
+           AllWithin(dead_m2, 0, kMost_m2) && AllWithin(reported_m2, 0, kMost_m2) &&
            std::isfinite(ledger.joule + ledger.generator + ledger.Out() + ledger.hook + ledger.film + ledger.plume);
   }
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include "services/base/core/hash.h"
@@ -39,10 +40,11 @@ SolidSurface::SolidSurface(const TissueScene& scene, SolidCharts charts)
       field_(MakeSolidSheet(scene, charts), material_),
       damage_(material_.body_C),
       source_(material_, field_.sheet()),
-      chart_of_(std::move(charts.of_triangle)) {}
+      charts_(std::move(charts)),
+      charts_of_tile_(static_cast<std::size_t>(field_.sheet().tile_count())) {}
 
 bool SolidSurface::Step(std::span<const TipInput> tips, float dt_s, Interface* hook) {
-  burn_.reset();
+  burns_.clear();
   const bool acts =
       std::any_of(tips.begin(), tips.end(), [&](const TipInput& tip) { return Acts(tip, hook->hook_theta); });
   if (!acts && field_.idle()) {
@@ -65,7 +67,7 @@ bool SolidSurface::Step(std::span<const TipInput> tips, float dt_s, Interface* h
   const float time_s = Duration(tips, dt_s);
   power_W_ = time_s > 0 ? static_cast<float>(ledger_.generator - before_J) / time_s : 0.0f;
   highest_C_ = std::max(highest_C_, material_.body_C + field_.MaxTheta());
-  if (frame_ % kMeasureFrames == 0) MeasureBurn(tips);
+  if (frame_ % kMeasureFrames == 0) MeasureBurns();
   return true;
 }
 
@@ -77,35 +79,60 @@ void SolidSurface::ApplySource(std::span<const TipInput> tips, float dt_s, float
   });
 }
 
-void SolidSurface::MeasureBurn(std::span<const TipInput> tips) {
-  double cells = 0;
-  const Tile* hottest = nullptr;
-  for (const auto& tile : field_.tiles()) {
-    if (!tile) continue;
-    for (int k = 0; k < kTileCells; ++k) {
-      const bool tissue = (tile->state.flags[k] & (kOutside | kQuarantined)) == 0;
-      const bool dead = tile->state.omega_cell[k] >= 1.0f || (tile->state.flags[k] & kRemoved) != 0;
-      if (tissue && dead) cells += static_cast<double>(tile->geometry.area[k]);
+void SolidSurface::AddDead(const Tile& tile, std::array<double, kMaxSolids>* cells,
+                           std::array<CellIndex, kMaxSolids>* where) {
+  const CellIndex corner{tile.tx * kTile, tile.ty * kTile};
+  std::vector<Index>& charts = charts_of_tile_[static_cast<std::size_t>(tile.index)];
+  if (charts.empty()) {
+    for (Index i = 0; i < charts_.charts.size(); ++i) {
+      const SolidChart& chart = charts_.charts[i];
+      const bool apart = chart.x >= corner.ix + kTile || chart.x + chart.width < corner.ix ||
+                         chart.y >= corner.iy + kTile || chart.y + chart.height < corner.iy;
+      if (!apart) charts.push_back(i);
     }
-    if (tile->state.awake != 0 && (hottest == nullptr || tile->theta_max > hottest->theta_max)) hottest = tile.get();
   }
-  dead_m2_ = static_cast<float>(cells) * kSolidCell_m * kSolidCell_m;
-  if (dead_m2_ < reported_m2_ + kReported_m2 || hottest == nullptr) return;
-  reported_m2_ = dead_m2_;
-  const CellIndex middle{hottest->tx * kTile + kTile / 2, hottest->ty * kTile + kTile / 2};
-  const bool touches = !tips.empty() && tips.back().touching;
-  burn_ = SolidBurn{touches ? tips.back().path.to : field_.sheet().CentreOf(middle),
-                    material_.body_C + hottest->theta_max, dead_m2_};
+  for (int k = 0; k < kTileCells; ++k) {
+    const bool tissue = (tile.state.flags[k] & (kOutside | kQuarantined)) == 0;
+    if (!tissue || (tile.state.omega_cell[k] < 1.0f && (tile.state.flags[k] & kRemoved) == 0)) continue;
+    const CellIndex cell{corner.ix + k % kTile, corner.iy + k / kTile};
+    const auto here = std::find_if(charts.begin(), charts.end(), [&](Index i) {
+      const SolidChart& chart = charts_.charts[i];
+      return cell.ix >= chart.x && cell.ix <= chart.x + chart.width && cell.iy >= chart.y &&
+             cell.iy <= chart.y + chart.height;
+    });
+    const Index solid = here != charts.end() ? charts_.charts[*here].solid : 0;
+    (*cells)[solid] += static_cast<double>(tile.geometry.area[k]);
+    (*where)[solid] = cell;
+  }
 }
+
+void SolidSurface::MeasureBurns() {
+  std::array<double, kMaxSolids> cells{};
+  std::array<CellIndex, kMaxSolids> where{};
+  for (const auto& tile : field_.tiles()) {
+    if (tile) AddDead(*tile, &cells, &where);
+  }
+  for (Index solid = 0; solid < kMaxSolids; ++solid) {
+    dead_m2_[solid] = static_cast<float>(cells[solid]) * kSolidCell_m * kSolidCell_m;
+    float& reported_m2 = reported_m2_[solid];
+    if (dead_m2_[solid] < reported_m2 + kReported_m2) continue;
+    burns_.push_back({solid, reported_m2 == 0.0f, field_.sheet().CentreOf(where[solid]),
+                      material_.body_C + field_.MaxTheta(), dead_m2_[solid]});
+    reported_m2 = dead_m2_[solid];
+  }
+}
+
+float SolidSurface::dead_m2() const { return std::accumulate(dead_m2_.begin(), dead_m2_.end(), 0.0f); }
 
 void SolidSurface::Clear() {
   field_.Clear();
   field_.RestoreQuarantined(0);
   source_.Import({});
   ledger_ = {};
-  burn_.reset();
+  burns_.clear();
   frame_ = 0;
-  power_W_ = highest_C_ = dead_m2_ = reported_m2_ = 0;
+  power_W_ = highest_C_ = 0;
+  dead_m2_ = reported_m2_ = {};
 }
 
 std::uint64_t SolidSurface::TickHash() const {
@@ -117,7 +144,7 @@ std::uint64_t SolidSurface::TickHash() const {
   }
   hash.AddValue(ledger_.joule);
   hash.AddValue(ledger_.Out());
-  hash.AddValue(dead_m2_);
+  hash.Add(std::span<const float>(dead_m2_));
   hash.AddValue(frame_);
   return hash.value();
 }

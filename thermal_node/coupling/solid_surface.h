@@ -2,13 +2,14 @@
 // heat, boiling and damage as the membrane. Nothing is cut: what vaporises leaves a pit as deep as the layer.
 #pragma once
 
+#include <array>
 #include <cstddef>
-#include <optional>
 #include <span>
 #include <vector>
 
 #include "services/base/core/scene_view.h"
 #include "services/base/core/solid_charts.h"
+#include "services/base/core/solids.h"
 #include "thermal_node/coupling/source_window.h"
 #include "thermal_node/coupling/tip_tracker.h"
 #include "thermal_node/damage/arrhenius.h"
@@ -29,9 +30,11 @@ inline constexpr float kSolidDisc_m = 1e-3f;
 [[nodiscard]] Material MakeSolidMaterial(const ThermalParams& params);
 
 struct SolidBurn {
+  Index solid = 0;                 ///< Index in TissueScene::solids; 0 in a scene of one organ.
+  bool first = false;              ///< The first of this solid.
   Vec2f material = Vec2f::Zero();  ///< Where, in the charts [m].
-  float temperature_C = 0;         ///< Highest there.
-  float dead_m2 = 0;               ///< Area of dead surface since the start.
+  float temperature_C = 0;         ///< Highest of all solids.
+  float dead_m2 = 0;               ///< Area of the solid's dead surface since the start.
 };
 
 class SolidSurface {
@@ -46,7 +49,7 @@ class SolidSurface {
 
   /// Chart of a triangle of the solids' surface; kNoIndex: none.
   [[nodiscard]] Index ChartOf(Index triangle) const {
-    return triangle < chart_of_.size() ? chart_of_[triangle] : kNoIndex;
+    return triangle < charts_.of_triangle.size() ? charts_.of_triangle[triangle] : kNoIndex;
   }
   [[nodiscard]] const HeatField& field() const { return field_; }
   [[nodiscard]] HeatField* mutable_field() { return &field_; }
@@ -55,10 +58,12 @@ class SolidSurface {
   [[nodiscard]] float power_W() const { return power_W_; }
   [[nodiscard]] float voltage_V() const { return power_W_ > 0 ? source_.stats().voltage_V : 0.0f; }
   [[nodiscard]] float highest_C() const { return highest_C_; }
-  /// Area of dead surface (cell death, Omega >= 1) since the start [m^2]; updated every tenth frame.
-  [[nodiscard]] float dead_m2() const { return dead_m2_; }
-  /// A burn to be reported: at the first square millimetre of an application, and with each further one.
-  [[nodiscard]] const std::optional<SolidBurn>& burn() const { return burn_; }
+  /// Area of dead surface (cell death, Omega >= 1) of all solids since the start [m^2]; updated every tenth frame.
+  [[nodiscard]] float dead_m2() const;
+  /// Burns to be reported after the last Step: of each solid at its first square millimetre and each further one.
+  [[nodiscard]] std::span<const SolidBurn> burns() const { return burns_; }
+  /// Whether a burn of this solid has been reported since the start.
+  [[nodiscard]] bool reported(Index solid) const { return solid < kMaxSolids && reported_m2_[solid] > 0.0f; }
 
   /// Hash of sums over the warm state; 0 while nothing has been heated since the start.
   [[nodiscard]] std::uint64_t TickHash() const;
@@ -76,18 +81,23 @@ class SolidSurface {
   struct Record;
   SolidSurface(const TissueScene& scene, SolidCharts charts);
   void ApplySource(std::span<const TipInput> tips, float dt_s, float from, float to);
-  void MeasureBurn(std::span<const TipInput> tips);
+  void MeasureBurns();
+  /// Adds the dead area of a tile to that of its solids, in cells, and where the last dead cell of each lies.
+  void AddDead(const Tile& tile, std::array<double, kMaxSolids>* cells, std::array<CellIndex, kMaxSolids>* where);
 
   ThermalParams params_;
   Material material_;
   HeatField field_;
   DamageModel damage_;
   SourceWindow source_;
-  std::vector<Index> chart_of_;  ///< By triangle.
+  SolidCharts charts_;
+  std::vector<std::vector<Index>> charts_of_tile_;  ///< By tile; empty until it was warm.
   Ledger ledger_;
-  std::optional<SolidBurn> burn_;
+  using BySolid = std::array<float, kMaxSolids>;
+  std::vector<SolidBurn> burns_;
   std::uint64_t frame_ = 0;  ///< Frames in which something was computed.
-  float power_W_ = 0, highest_C_ = 0, dead_m2_ = 0, reported_m2_ = 0;
+  float power_W_ = 0, highest_C_ = 0;
+  BySolid dead_m2_{}, reported_m2_{};
 };
 
 }  // namespace fulcrum::thermal

@@ -243,13 +243,26 @@ void ThermalNode::PublishOpenCells(const Tick& tick) {
 
 void ThermalNode::PublishEvents(const Tick& tick) {
   for (const SolverEvent& event : solver_.events()) PublishEvent(tick, event);
-  if (solids_stepped_ && solids_->burn()) {
-    const SolidBurn& burn = *solids_->burn();
-    PublishEvent(tick, {ThermalEventKind::kSolidBurn, burn.material, burn.temperature_C, burn.dead_m2});
+  if (!solids_stepped_) return;
+  for (const SolidBurn& burn : solids_->burns()) {
+    const SolverEvent event{ThermalEventKind::kSolidBurn, burn.material, burn.temperature_C, burn.dead_m2};
+    PublishEvent(tick, event, static_cast<std::uint8_t>(burn.solid));
+    // The damage integral of dead surface is 1.
+    const std::optional<ThermalEventKind> injury = InjuryOf(burn.solid);
+    if (burn.first && injury) PublishEvent(tick, {*injury, burn.material, burn.temperature_C, 1.0f});
   }
 }
 
-void ThermalNode::PublishEvent(const Tick& tick, const SolverEvent& event) {
+/// Dead surface is an injury of a ureter or nerve.
+std::optional<ThermalEventKind> ThermalNode::InjuryOf(Index solid) const {
+  if (solid >= scene_.solids.size()) return std::nullopt;
+  const SolidLook look = scene_.solids[solid].look;
+  if (look == SolidLook::kUreter) return ThermalEventKind::kUreterInjury;
+  if (look == SolidLook::kNerve) return ThermalEventKind::kNerveInjury;
+  return std::nullopt;
+}
+
+void ThermalNode::PublishEvent(const Tick& tick, const SolverEvent& event, std::uint8_t solid) {
   ThermalEvent message;
   message.stamp = event_stamper_.Next(tick.stamp_ns);
   message.session_time_s = tick.session_time_s;
@@ -257,6 +270,7 @@ void ThermalNode::PublishEvent(const Tick& tick, const SolverEvent& event) {
   message.material = event.material;
   message.temperature_C = event.temperature_C;
   message.value = event.value;
+  message.solid = solid;
   message.topology_revision = solver_.topology().revision();
   ports_.event.Write(message);
 }
@@ -340,6 +354,9 @@ void ThermalNode::NoteHealth() {
   if (solids_ != nullptr) {
     f.delivered_J += solids_->ledger().generator;
     f.solids_dead_m2 = solids_->dead_m2();
+    for (Index solid = 0; solid < scene_.solids.size(); ++solid) {
+      f.solver.injuries += solids_->reported(solid) && InjuryOf(solid) ? 1 : 0;
+    }
     f.solver.highest_C = std::max(f.solver.highest_C, solids_->highest_C());
     f.solver.present_C = std::max(f.solver.present_C, scene_.thermal.body_temperature_C + solids_->field().MaxTheta());
     f.solver.power_W += solids_->power_W();

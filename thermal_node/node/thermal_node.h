@@ -79,6 +79,7 @@ class ThermalNode {
   [[nodiscard]] TipInput AdvanceOnSolids(const CauteryContact& sample, const GeneratorDemand& demand, double dt_s);
   void StepSolids(double dt_s);
   [[nodiscard]] std::uint64_t StateHash() const;
+  [[nodiscard]] std::optional<ThermalEventKind> InjuryOf(Index solid) const;
   /// Reads the torn edges, if a new message arrived.
   void TakeTears();
   void SaveCheckpoint();
@@ -87,7 +88,7 @@ class ThermalNode {
   /// Publishes the removed cells around the hook while it touches tissue, if they have changed.
   void PublishOpenCells(const Tick& tick);
   void PublishEvents(const Tick& tick);
-  void PublishEvent(const Tick& tick, const SolverEvent& event);
+  void PublishEvent(const Tick& tick, const SolverEvent& event, std::uint8_t solid = kNoSolid);
   void PublishPatch(const Tick& tick);
   struct NextPatch {
     BurntSurface surface;

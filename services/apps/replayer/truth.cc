@@ -14,6 +14,9 @@ using render::Hit;
 /// at a flat angle is that much nearer.
 constexpr double kHidden_m = 0.0005, kHiddenBySelf_m = 0.002;
 
+/// The burns have the triangles of the solids' surface: their depths differ by rounding only [m].
+constexpr float kSameSurface_m = 1e-4f;
+
 std::string KeyOf(const DrawnSurface& surface) {
   return surface.name + " " + std::to_string(surface.tool) + " " + std::to_string(surface.part);
 }
@@ -61,8 +64,14 @@ bool IsTool(TruthClass what) { return what >= TruthClass::kGrasper && what <= Tr
 
 Moment::Moment(render::LaparoscopeView* view, const render::Laparoscope& from, const SceneView& scene, int columns,
                int rows)
-    : scope(from), width(columns), height(rows), surfaces(render::DrawnSurfaces(view->root())), atlas(view->atlas()) {
+    : scope(from),
+      width(columns),
+      height(rows),
+      surfaces(render::DrawnSurfaces(view->root())),
+      atlas(view->atlas()),
+      burn(render::DrawnBurn(view->root())) {
   for (std::size_t k = 0; k < kMaxTools; ++k) kinds[k] = scene.tools[k].kind;
+  if (burn) burn_atlas = view->burn_atlas();
 }
 
 Truth::Truth(Moment moment)
@@ -78,16 +87,21 @@ Truth::Truth(Moment moment)
   }
   Draw(moment.atlas);
   TakeHeat(moment.atlas);
+  if (moment.burn) TakeHeatOfSolids(*moment.burn, moment.burn_atlas);
 }
 
-void Truth::Draw(const render::Atlas& atlas) {
+std::vector<Vec3d> Truth::InCamera(const DrawnSurface& surface) const {
   const Eigen::Matrix3d turn = view_.topLeftCorner<3, 3>();
   const Vec3d place = view_.topRightCorner<3, 1>();
   std::vector<Vec3d> positions;
+  positions.reserve(surface.positions_W.size());
+  for (const Vec3d& p_W : surface.positions_W) positions.push_back(turn * p_W + place);
+  return positions;
+}
+
+void Truth::Draw(const render::Atlas& atlas) {
   for (std::size_t i = 0; i < surfaces_.size(); ++i) {
     const DrawnSurface& surface = surfaces_[i];
-    positions.clear();
-    for (const Vec3d& p_W : surface.positions_W) positions.push_back(turn * p_W + place);
     render::RasterOptions options{.behind_m = surface.behind_m, .cull_back = surface.cull_back};
     const auto removed = [&atlas](const Corner& at) { return atlas.Removed({at[0], at[1]}); };
     const auto at = [&surface](std::uint32_t triangle, float b1, float b2) {
@@ -104,7 +118,7 @@ void Truth::Draw(const render::Atlas& atlas) {
         return corner[3] > 0.5f || removed(corner);
       };
     }
-    raster_.Add(static_cast<std::int32_t>(i), positions, surface.triangles, options);
+    raster_.Add(static_cast<std::int32_t>(i), InCamera(surface), surface.triangles, options);
   }
 }
 
@@ -114,13 +128,44 @@ void Truth::TakeHeat(const render::Atlas& atlas) {
     for (int x = 0; x < width; ++x) {
       const auto corner = CoordinateOf(raster_.At(x, height - 1 - y));
       const auto texel = corner ? atlas.At({(*corner)[0], (*corner)[1]}) : std::nullopt;
-      if (!texel) continue;
-      const double celsius = 20 + 0.5 * (*texel)[0];  // As membrane.frag reads them.
-      temperature_.At(x, y) = Rounded(celsius / kTemperatureUnit_C, 65535);
-      damage_.At(x, y) = (*texel)[1];
-      water_.At(x, y) = Rounded(255 - 2.0 * (*texel)[2], 255);
+      if (texel) SetHeat(x, y, *texel);
     }
   }
+}
+
+void Truth::TakeHeatOfSolids(const DrawnSurface& burn, const render::BurnAtlas& atlas) {
+  const auto texel_at = [&](std::uint32_t triangle, float b1, float b2) {
+    const Corner at = Between(burn.coordinates, burn.triangles[triangle], {0, triangle, b1, b2, 0});
+    return atlas.At(static_cast<Index>(std::lround(at[2])), {at[0], at[1]});
+  };
+  render::Rasteriser raster(camera());
+  const std::vector<Vec3d> positions = InCamera(burn);
+  render::RasterOptions options{.behind_m = burn.behind_m, .cull_back = burn.cull_back};
+  // A triangle over the border of two charts is there for each. Where both have texels, those that have changed show,
+  // as in the picture: of two equal depths the first stays.
+  for (const bool changed_only : {true, false}) {
+    options.shown = [&texel_at, &atlas, changed_only](std::uint32_t triangle, float b1, float b2) {
+      const auto texel = texel_at(triangle, b1, b2);
+      return texel && (!changed_only || *texel != atlas.intact());
+    };
+    raster.Add(0, positions, burn.triangles, options);
+  }
+  const int width = camera().width, height = camera().height;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const Hit &solid = raster_.At(x, height - 1 - y), &over = raster.At(x, height - 1 - y);
+      if (const TruthClass what = ClassOf(solid); what != TruthClass::kRectum && what != TruthClass::kOrgan) continue;
+      if (!over.any() || std::abs(over.depth_m - solid.depth_m) > kSameSurface_m) continue;
+      if (const auto texel = texel_at(over.triangle, over.b1, over.b2)) SetHeat(x, y, *texel);
+    }
+  }
+}
+
+void Truth::SetHeat(int x, int y, const std::array<std::uint8_t, 4>& texel) {
+  const double celsius = 20 + 0.5 * texel[0];  // As membrane.frag reads them.
+  temperature_.At(x, y) = Rounded(celsius / kTemperatureUnit_C, 65535);
+  damage_.At(x, y) = texel[1];
+  water_.At(x, y) = Rounded(255 - 2.0 * texel[2], 255);
 }
 
 std::optional<Truth::Corner> Truth::CoordinateOf(const Hit& hit) const {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "render_node/geometry/rasteriser.h"
+#include "render_node/geometry/solid_burn.h"
 #include "render_node/scene_graph/drawn_surfaces.h"
 #include "render_node/scene_graph/laparoscope_view.h"
 #include "services/apps/replayer/channels.h"
@@ -36,7 +37,7 @@ inline constexpr int kFirstToolInstance = 16, kFirstOrganInstance = 32;
 
 inline constexpr double kDepthUnit_m = 2e-5;        ///< Of a depth image; 0: nothing.
 inline constexpr double kFlowUnit_px = 1.0 / 64;    ///< Of a flow image, whose zero is 32768.
-inline constexpr double kTemperatureUnit_C = 0.01;  ///< Of a temperature image; 0: not a sheet.
+inline constexpr double kTemperatureUnit_C = 0.01;  ///< Of a temperature image; 0: unknown.
 enum class FlowState : std::uint16_t { kNone, kVisible, kHidden };
 
 /// For LaparoscopeView::SetDetail(): tissue is drawn alike in all pictures, within a sixteenth of half a pixel.
@@ -52,6 +53,8 @@ struct Moment {
   int width, height;
   std::vector<render::DrawnSurface> surfaces;
   render::Atlas atlas;
+  std::optional<render::DrawnSurface> burn;  ///< Over the solids; none: no burnt chart of them is in the field.
+  render::BurnAtlas burn_atlas;              ///< Empty without `burn`.
 };
 
 /// The ground truth of a moment.
@@ -84,7 +87,7 @@ class Truth {
   [[nodiscard]] Channel Normals() const;
   /// Displacement to the picture `next`, right and down [kFlowUnit_px], and a FlowState.
   [[nodiscard]] Channel FlowTo(const Truth& next) const;
-  /// Of membrane and fat; taken when the object is made.
+  /// Of membrane, fat, and the charts of solids that have a burn; 0 elsewhere. Taken when the object is made.
   [[nodiscard]] const Channel& temperature() const { return temperature_; }
   [[nodiscard]] const Channel& damage() const { return damage_; }  ///< Share of denatured collagen, 255: all.
   [[nodiscard]] const Channel& water() const { return water_; }    ///< Share left, 255: all.
@@ -93,6 +96,10 @@ class Truth {
   using Corner = std::array<float, 4>;
   void Draw(const render::Atlas& atlas);
   void TakeHeat(const render::Atlas& atlas);
+  void TakeHeatOfSolids(const render::DrawnSurface& burn, const render::BurnAtlas& atlas);
+  void SetHeat(int x, int y, const std::array<std::uint8_t, 4>& texel);
+  /// Corners in the camera frame.
+  [[nodiscard]] std::vector<Vec3d> InCamera(const render::DrawnSurface& surface) const;
   [[nodiscard]] std::optional<Corner> CoordinateOf(const render::Hit& hit) const;
   /// Unit normal of the triangle, frame W, on either side.
   [[nodiscard]] Vec3d NormalOf(const render::Hit& hit) const;

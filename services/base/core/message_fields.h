@@ -44,7 +44,7 @@ namespace fulcrum {
   F(height) F(size) F(present) F(scopes) F(eye_W) F(right_W) F(up_W) F(forward_W) F(pixel_rad) F(tip_W) F(scale)
 #define FULCRUM_FIELDS_OF_Picture(F) F(header) F(jpeg)
 #define FULCRUM_FIELDS_OF_ThermalEvent(F) F(stamp) F(session_time_s) F(kind) F(material) F(temperature_C) F(value) \
-  F(topology_revision)
+  F(solid) F(topology_revision)
 #define FULCRUM_FIELDS_OF_SceneManifest(F) F(stamp) F(scene_name) F(session_id) F(scene_hash) F(session_start_ns) \
   F(mode) F(recorded)
 #define FULCRUM_FIELDS_OF_ConsumedInput(F) F(topic) F(epoch) F(sequence)

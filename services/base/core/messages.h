@@ -339,6 +339,7 @@ enum class ThermalEventKind : std::uint8_t {
   kSolidBurn
 };
 inline constexpr std::size_t kThermalEventKinds = 11;
+inline constexpr std::uint8_t kNoSolid = 255;
 
 struct ThermalEvent {
   Stamp stamp;
@@ -346,8 +347,10 @@ struct ThermalEvent {
   ThermalEventKind kind = ThermalEventKind::kContact;
   Vec2f material = Vec2f::Zero();  ///< Place on the membrane (s, t), for kSolidBurn in the charts of the solids [m].
   float temperature_C = 0;
-  /// Kind-specific: cut length so far [m] for kCut, damage integral for injuries, dead area [m^2] for kSolidBurn.
+  /// Kind-specific: cut length so far [m] for kCut, damage integral for injuries, the solid's dead area [m^2] for
+  /// kSolidBurn.
   float value = 0;
+  std::uint8_t solid = kNoSolid;  ///< For kSolidBurn: index in TissueScene::solids, 0 in a scene of one organ.
   std::uint64_t topology_revision = 0;
 };
 

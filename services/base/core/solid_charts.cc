@@ -6,6 +6,8 @@
 #include <optional>
 #include <utility>
 
+#include "services/base/core/solids.h"
+
 namespace fulcrum {
 namespace {
 
@@ -48,7 +50,10 @@ struct Box {
 class Cutter {
  public:
   explicit Cutter(const TissueScene& scene)
-      : scene_(scene), triangles_(scene.tube_surface), beyond_(Neighbours(triangles_)) {
+      : scene_(scene),
+        triangles_(scene.tube_surface),
+        beyond_(Neighbours(triangles_)),
+        solid_of_(SolidOfVertices(scene)) {
     for (const Triangle& t : triangles_) {
       const Vec3f normal = (At(t[1]) - At(t[0])).cross(At(t[2]) - At(t[0]));
       areas_.push_back(normal);  // Of twice the area.
@@ -69,6 +74,8 @@ class Cutter {
       if (normals_[seed].dot(mean.stableNormalized()) < kLeastCosine) mean = areas_[seed];
       auto [chart, own] = Grow(seed, mean.stableNormalized(), result.of_triangle);
       for (const Index t : own) result.of_triangle[t] = static_cast<Index>(result.charts.size());
+      const Index vertex = triangles_[seed][0];
+      chart.solid = vertex < solid_of_.size() ? solid_of_[vertex] : 0;
       result.charts.push_back(chart);
     }
     return result;
@@ -111,6 +118,7 @@ class Cutter {
   const TissueScene& scene_;
   std::span<const Triangle> triangles_;
   std::vector<std::array<Index, 3>> beyond_;
+  std::vector<Index> solid_of_;  ///< By vertex.
   std::vector<Vec3f> areas_, normals_;
   std::vector<std::uint8_t> seen_;
 };

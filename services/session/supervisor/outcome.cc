@@ -30,7 +30,7 @@ std::string SessionOutcome::verdict() const {
   return line;
 }
 
-std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
+std::vector<KeyFigure> KeyFigures(const SessionOutcome& outcome, const SessionRecord& record) {
   using enum NodeId;
   struct Source {
     NodeId node;
@@ -68,6 +68,12 @@ std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
     figures.push_back({source.key, source.label, source.unit, source.decimals,
                        source.at_end ? record.last(source.key) : record.peak(source.key)});
   }
+  for (const auto& [solid, m2] : record.burnt_m2()) {
+    const std::string name = solid < outcome.solids.size() ? outcome.solids[solid] : "organ";
+    std::string key = "burnt." + name + "_mm2";
+    std::replace(key.begin(), key.end(), ' ', '_');
+    figures.push_back({key, "burnt surface of " + name, "mm²", 1, 1e6 * m2});
+  }
   return figures;
 }
 
@@ -90,7 +96,7 @@ std::string SummaryJson(const SessionOutcome& outcome, const SessionRecord& reco
   json.Add("faults", static_cast<double>(outcome.faults.size()));
   json.Add("session_seconds", outcome.duration_s);
   json.Add("wanted_seconds", outcome.wanted_s);
-  for (const KeyFigure& figure : KeyFigures(record)) {
+  for (const KeyFigure& figure : KeyFigures(outcome, record)) {
     json.Add(figure.key, figure.value);
   }
   if (!outcome.recording.empty()) {
@@ -158,9 +164,9 @@ std::string NodeTable(const std::vector<NodeId>& nodes, const SessionRecord& rec
 
 std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& record) {
   std::string text = NodeTable(outcome.nodes, record) + "\n";
-  for (const KeyFigure& figure : KeyFigures(record)) {
+  for (const KeyFigure& figure : KeyFigures(outcome, record)) {
     std::array<char, 128> line{};
-    std::snprintf(line.data(), line.size(), "%-34s %10s %s\n", figure.label,
+    std::snprintf(line.data(), line.size(), "%-34s %10s %s\n", figure.label.c_str(),
                   Fixed(figure.value, figure.decimals).c_str(), figure.unit);
     text += line.data();
   }

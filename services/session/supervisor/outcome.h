@@ -27,6 +27,7 @@ struct SessionOutcome {
   std::string machine;        ///< CPU model and count.
   std::string configuration;  ///< Effective configuration, YAML.
   std::vector<NodeId> nodes;  ///< Nodes of the session, in the order of their start.
+  std::vector<std::string> solids;  ///< Names of the scene's solids; empty: it has one organ.
   double duration_s = 0;      ///< Session time reached [s].
   double wanted_s = 0;        ///< Session time requested [s]; 0: until stopped.
   ExitCode exit_code = ExitCode::kDone;
@@ -45,14 +46,14 @@ struct SessionOutcome {
 
 /// A named figure of a session. Table, JSON and report all use this list.
 struct KeyFigure {
-  const char* key;    ///< Key in summary.json.
-  const char* label;  ///< Label in table and report.
+  std::string key;    ///< Key in summary.json.
+  std::string label;  ///< Label in table and report.
   const char* unit;
   int decimals;
   double value;
 };
-/// Figures of the nodes that reported.
-[[nodiscard]] std::vector<KeyFigure> KeyFigures(const SessionRecord& record);
+/// Figures of the nodes that reported, and what was burnt of each solid.
+[[nodiscard]] std::vector<KeyFigure> KeyFigures(const SessionOutcome& outcome, const SessionRecord& record);
 
 /// Text on the samples that are missing from the recording: "no sample lost" or a count, and the recorder's restarts.
 [[nodiscard]] std::string RecordingLosses(const SessionRecord& record);

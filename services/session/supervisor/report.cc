@@ -64,9 +64,9 @@ std::string Header(const SessionOutcome& outcome) {
   return html;
 }
 
-std::string Tiles(const SessionRecord& record) {
+std::string Tiles(const SessionOutcome& outcome, const SessionRecord& record) {
   std::string html = "<div class='tiles'>";
-  for (const KeyFigure& figure : KeyFigures(record)) {
+  for (const KeyFigure& figure : KeyFigures(outcome, record)) {
     html += "<div class='tile'><b>" + Fixed(figure.value, figure.decimals) + " <small>" + figure.unit +
             "</small></b><span>" + EscapeHtml(figure.label) + "</span></div>\n";
   }
@@ -284,7 +284,7 @@ std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& recor
       "<meta name='viewport' content='width=device-width, initial-scale=1'><title>Fulcrum · ";
   html += EscapeHtml(outcome.scene_name + " · " + outcome.session_id) + "</title><style>" + kStyle;
   html += "</style></head><body><main>\n";
-  html += Header(outcome) + Tiles(record) + (outcome.sheet ? SheetHtml(*outcome.sheet, outcome.trainee) : "") +
+  html += Header(outcome) + Tiles(outcome, record) + (outcome.sheet ? SheetHtml(*outcome.sheet, outcome.trainee) : "") +
           Video(outcome) + Pictures(frames) + CutMap(outcome.cut_map) + Plots(outcome, record) +
           Nodes(outcome, record) + Faults(outcome) + Restarts(record) + Refusals(record) + Events(record);
   if (!outcome.recording.empty()) {

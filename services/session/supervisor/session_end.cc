@@ -26,6 +26,7 @@ SessionOutcome OutcomeOf(const SessionSetup& setup, double reached_s) {
   outcome.configuration = setup.folder.configuration;
   outcome.nodes = setup.node_ids;
   outcome.nodes.insert(outcome.nodes.end(), setup.remote_ids.begin(), setup.remote_ids.end());
+  for (const Solid& solid : setup.scene.view().solids) outcome.solids.emplace_back(solid.name);
   outcome.duration_s = reached_s;
   outcome.wanted_s = setup.end_s;
   outcome.recording = setup.recording;

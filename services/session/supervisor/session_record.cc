@@ -122,6 +122,10 @@ void SessionRecord::AddHealth(double time_s, const Health& health) {
 
 void SessionRecord::AddEvent(const ThermalEvent& event) {
   ++event_counts_[event.kind];
+  if (event.kind == ThermalEventKind::kSolidBurn && event.solid != kNoSolid) {
+    double& burnt_m2 = burnt_m2_[event.solid];
+    burnt_m2 = std::max(burnt_m2, static_cast<double>(event.value));
+  }
   if (events_.size() < kMostEvents) {
     events_.push_back({event.session_time_s, event.kind, static_cast<double>(event.temperature_C)});
   }
@@ -161,6 +165,8 @@ std::string MissingFrom(const SessionRecord& record, const ScriptDemands& demand
                   what, value, least);
     return std::string(text);
   };
+  // A hook that burns an organ need neither move nor open anything.
+  if (!record.burnt_m2().empty()) return {};
   const double displacement = record.peak("max_displacement_mm");
   if (demands.deformation && displacement < kLeastDisplacement_mm) {
     return missing("nothing was deformed", displacement, kLeastDisplacement_mm);

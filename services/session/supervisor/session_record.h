@@ -104,6 +104,8 @@ class SessionRecord {
   /// The first kMostEvents events.
   [[nodiscard]] const std::vector<EventRecord>& events() const { return events_; }
   [[nodiscard]] const std::map<ThermalEventKind, std::uint64_t>& event_counts() const { return event_counts_; }
+  /// Dead surface by solid [m^2], of those that were burnt.
+  [[nodiscard]] const std::map<std::uint8_t, double>& burnt_m2() const { return burnt_m2_; }
 
   [[nodiscard]] const bus::Refusals& refusals() const { return refusals_; }
   [[nodiscard]] const std::vector<RefusalRecord>& refused() const { return refused_; }
@@ -127,6 +129,7 @@ class SessionRecord {
   bus::Refusals refusals_;
   std::vector<RefusalRecord> refused_;
   std::map<ThermalEventKind, std::uint64_t> event_counts_;
+  std::map<std::uint8_t, double> burnt_m2_;
 };
 
 /// Thresholds below which an effect counts as missing: above rounding and relaxation, far below any scripted action.

@@ -144,6 +144,21 @@ class TruthTest : public ::testing::Test {
     }
     laparoscope_->Update();
   }
+  /// Gives all texels of the solids this value; shown after the next Update().
+  void BurnSolids(const std::array<std::uint8_t, 4>& texel) {
+    TemperaturePatch patch;
+    patch.header.surface = BurntSurface::kSolids;
+    for (int k = 0; k < kPatchTexels * kPatchTexels; ++k) {
+      patch.texels.insert(patch.texels.end(), texel.begin(), texel.end());
+    }
+    for (int y = 0; y < kAtlasTexels; y += kPatchTexels) {
+      for (int x = 0; x < kAtlasTexels; x += kPatchTexels) {
+        patch.header.origin_x = static_cast<std::uint32_t>(x);
+        patch.header.origin_y = static_cast<std::uint32_t>(y);
+        (void)laparoscope_->ApplyPatch(patch);  // Most lie outside the atlas.
+      }
+    }
+  }
   /// @param finer times as many lines as the picture.
   Truth TruthNow(int finer = 1) {
     return Truth({&*laparoscope_, laparoscope_->laparoscope(), scene_, finer * static_cast<int>(scene_.render.width),
@@ -340,6 +355,52 @@ TEST_F(TruthTest, HeatIsThatOfTheSheet) {
   }
   EXPECT_GT(cold, 5000);
   EXPECT_GT(burnt, 20);
+}
+
+TEST_F(TruthTest, HeatOfASolidIsThatOfItsBurntCharts) {
+  // The sheet is moved aside: half of the rectum in the field is bared, beside what is still covered.
+  constexpr float kAside_m = 0.03f;
+  std::vector<float> xyz;
+  for (std::size_t i = 0; i < scene_.rest_position.size(); ++i) {
+    const Vec3f& p_W = scene_.rest_position[i];
+    const float aside = i >= scene_.membrane.first ? kAside_m : 0;
+    xyz.insert(xyz.end(), {p_W.x() + aside, p_W.y(), p_W.z()});
+  }
+  laparoscope_->SetTissue(xyz);
+  laparoscope_->Update();
+  const Truth cold = TruthNow();
+  BurnSolids({120, 200, 60, 255});
+  laparoscope_->Update();
+  const Truth burnt = TruthNow();
+
+  Channel classes = burnt.Classes();
+  EXPECT_EQ(cold.Classes().values, classes.values) << "nothing opens";
+  Channel before = cold.temperature(), temperature = burnt.temperature();
+  Channel damage_before = cold.damage(), damage = burnt.damage(), water_before = cold.water(), water = burnt.water();
+  int rectum = 0, membrane = 0, known = 0;
+  for (int y = 0; y < classes.height; ++y) {
+    for (int x = 0; x < classes.width; ++x) {
+      const auto what = static_cast<TruthClass>(classes.At(x, y));
+      membrane += what == TruthClass::kMembrane ? 1 : 0;
+      rectum += what == TruthClass::kRectum ? 1 : 0;
+      if (what != TruthClass::kRectum) {
+        EXPECT_EQ(temperature.At(x, y), before.At(x, y)) << x << " " << y;
+        EXPECT_EQ(damage.At(x, y), damage_before.At(x, y));
+        EXPECT_EQ(water.At(x, y), water_before.At(x, y));
+        continue;
+      }
+      EXPECT_EQ(before.At(x, y), 0);
+      EXPECT_EQ(damage_before.At(x, y), 0);
+      if (temperature.At(x, y) == 0) continue;
+      ++known;
+      EXPECT_EQ(temperature.At(x, y), 8000);
+      EXPECT_EQ(damage.At(x, y), 200);
+      EXPECT_EQ(water.At(x, y), 255 - 2 * 60);
+    }
+  }
+  EXPECT_GT(rectum, 1000);
+  EXPECT_GT(membrane, 1000);
+  EXPECT_GT(known, 0.9 * rectum) << "all charts are burnt";
 }
 
 TEST(RunLengths, AlternateColumnByColumnFromZero) {

@@ -153,12 +153,22 @@ TEST(Prompts, SayWhatIsWrongWhileItIs) {
   EXPECT_EQ(run.assessor.PromptsAt(2), 0u);
   for (int i = 0; i < 40; ++i) AddTip(3 + 0.01 * i, Vec2f::Zero(), false, CauteryMode::kCoag, &run.assessor);
   EXPECT_EQ(run.assessor.PromptsAt(3.4), BitOf(Prompt::kPedalWithoutContact));
+  // Current into an organ is no current into air.
+  for (int i = 0; i < 40; ++i) {
+    CauteryContact contact = test::TipAt(4 + 0.01 * i, Vec2f::Zero(), false);
+    contact.on_solid = true;
+    run.assessor.Add(contact);
+  }
+  EXPECT_EQ(run.assessor.PromptsAt(4.4), 0u);
   AddTip(5, Vec2f(0.03f, 0.04f), true, CauteryMode::kCut, &run.assessor);
   EXPECT_EQ(run.assessor.PromptsAt(5.1), BitOf(Prompt::kUreterNear) | BitOf(Prompt::kOffLine));
   AddTip(6, Vec2f(0.03f, 0.04f), true, CauteryMode::kOff, &run.assessor);
   EXPECT_EQ(run.assessor.PromptsAt(6.1), 0u) << "without current it may be touched";
   ThermalEvent event;
   event.session_time_s = 8;
+  event.kind = ThermalEventKind::kSolidBurn;
+  run.assessor.Add(event);
+  EXPECT_EQ(run.assessor.PromptsAt(8.1), BitOf(Prompt::kOrganBurnt));
   event.kind = ThermalEventKind::kNerveInjury;
   run.assessor.Add(event);
   EXPECT_EQ(MostUrgent(run.assessor.PromptsAt(9)), "injury: stop");

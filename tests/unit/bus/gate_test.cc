@@ -146,7 +146,14 @@ TEST(GateRanges, CauteryContact) {
        {"gaps without a footprint", [](auto& m) { m.footprint.width = 0; }},
        {"a footprint without gaps", [](auto& m) { m.footprint.gap.clear(); }},
        {"a footprint beyond all sheets", [](auto& m) { m.footprint.x = -200'000'000; }},
-       {"touching nothing", [](auto& m) { m.triangle = kNoIndex; }}});
+       {"touching nothing", [](auto& m) { m.triangle = kNoIndex; }},
+       {"on two surfaces", [](auto& m) { m.on_solid = true; }},
+       {"on no triangle of a solid",
+        [](auto& m) {
+          m.touching = false;
+          m.on_solid = true;
+          m.triangle = kNoIndex;
+        }}});
 }
 
 TEST(GateRanges, GeneratorSetting) {

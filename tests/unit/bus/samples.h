@@ -206,6 +206,7 @@ inline ThermalEvent Sample(std::uint64_t sequence) {
   m.material = {0.01f, 0.02f};
   m.temperature_C = 55.5f;
   m.value = 0.125f;
+  m.solid = 3;
   m.topology_revision = 9;
   return m;
 }

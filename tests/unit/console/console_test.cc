@@ -331,6 +331,8 @@ TEST(Advice, ThePatientComesFirstAndEachHasSomethingToDo) {
   // A warning of heat ends without further events; an injury stays.
   situation.now_ns += 60'000'000'000;
   EXPECT_STRNE(WarningsOf(situation)[0].level, "danger");
+  situation.events_ns[static_cast<std::size_t>(ThermalEventKind::kSolidBurn)] = situation.now_ns;
+  EXPECT_NE(WarningsOf(situation)[0].text.find("burns the surface of an organ"), std::string::npos);
   situation.events_ns[static_cast<std::size_t>(ThermalEventKind::kNerveInjury)] = kNow;
   EXPECT_NE(WarningsOf(situation)[0].text.find("nerve is injured"), std::string::npos);
 }

@@ -15,10 +15,10 @@ using test::Encode;
 using Result = PatchReceiver::Result;
 
 /// A hot spot of `radius` texels about the middle.
-TemperaturePatch Spot(std::uint32_t slot, double radius, std::uint64_t sequence) {
+TemperaturePatch Spot(std::uint64_t slot, double radius, std::uint64_t sequence) {
   TemperaturePatch patch;
   patch.header.stamp = {sequence, 9, static_cast<std::int64_t>(sequence)};
-  patch.header.slot = slot;
+  patch.header.slot = static_cast<std::uint16_t>(slot);
   patch.header.origin_x = 512;
   patch.header.origin_y = 256;
   patch.header.max_temperature_C = 80;
@@ -90,6 +90,21 @@ TEST(PatchCodec, HealsFromLossWithoutAnotherPatch) {
   sender.Flush([&](std::span<const std::uint8_t> chunk) { last = receiver.Take(chunk); });
   ASSERT_EQ(last, Result::kFrame);
   EXPECT_EQ(receiver.patch().texels, patch.texels);
+}
+
+TEST(PatchCodec, ASlotThatChangesItsSurfaceBeginsAnew) {
+  PatchSender sender;
+  PatchReceiver receiver;
+  std::uint64_t sequence = 0;
+  for (const BurntSurface surface : {BurntSurface::kMembrane, BurntSurface::kSolids, BurntSurface::kMembrane}) {
+    TemperaturePatch patch = Spot(2, surface == BurntSurface::kSolids ? 30 : 12, ++sequence);
+    patch.header.surface = surface;
+    Result last = Result::kBad;
+    for (const Chunk& chunk : Encode(&sender, patch)) last = receiver.Take(chunk);
+    ASSERT_EQ(last, Result::kFrame);
+    EXPECT_EQ(receiver.patch().header.surface, surface);
+    EXPECT_EQ(receiver.patch().texels, patch.texels);
+  }
 }
 
 TEST(PatchCodec, ASlotThatMovesBeginsAnew) {

@@ -68,8 +68,9 @@ class SolidBurnTest : public testing::Test {
 
 TEST_F(SolidBurnTest, MakesNothingBeforeTheFirstPatch) {
   const SolidBurn burn(view_);
-  EXPECT_EQ(burn.width(), 0);
-  EXPECT_TRUE(burn.texels().empty());
+  EXPECT_EQ(burn.atlas().width(), 0);
+  EXPECT_TRUE(burn.atlas().texels().empty());
+  EXPECT_FALSE(burn.atlas().At(chart_, material_));
   EXPECT_TRUE(burn.triangles().empty());
   EXPECT_EQ(burn.additions(), 0u);
 }
@@ -86,12 +87,13 @@ TEST_F(SolidBurnTest, ABurnAddsTheDrawnTrianglesOfItsChartAndNoOthers) {
   SolidBurn burn(view_);
   const AtlasRect rect = burn.Apply(Patch(200));
   EXPECT_FALSE(rect.empty());
-  EXPECT_GE(burn.width(), charts_.width);
-  EXPECT_GE(burn.height(), charts_.height);
+  EXPECT_GE(burn.atlas().width(), charts_.width);
+  EXPECT_GE(burn.atlas().height(), charts_.height);
   EXPECT_EQ(burn.additions(), 1u);
   ASSERT_FALSE(burn.triangles().empty());
   EXPECT_LT(burn.triangles().size(), view_.surface_triangles.size());
   ASSERT_EQ(burn.vertices().size(), burn.materials().size());
+  ASSERT_EQ(burn.vertices().size(), burn.charts().size());
   ASSERT_EQ(burn.vertices().size(), burn.boxes().size());
 
   // The simulated triangles of the chart at rest, and the most that a drawn triangle of it reaches beyond them: half a
@@ -110,6 +112,7 @@ TEST_F(SolidBurnTest, ABurnAddsTheDrawnTrianglesOfItsChartAndNoOthers) {
     const Vec3f& rest = rest_[burn.vertices()[k]];
     EXPECT_TRUE((rest.array() > low.array() - kBeyond_m).all() && (rest.array() < high.array() + kBeyond_m).all());
     EXPECT_LT((burn.materials()[k] - chart.Material(rest)).norm(), 1e-6f);
+    EXPECT_EQ(burn.charts()[k], chart_);
   }
 }
 
@@ -147,7 +150,28 @@ TEST_F(SolidBurnTest, ASecondPatchOfTheSameChartAddsTexelsOnly) {
   EXPECT_FALSE(burn.Apply(Patch(255)).empty());
   EXPECT_EQ(burn.triangles().size(), triangles);
   EXPECT_EQ(burn.additions(), 1u);
-  EXPECT_EQ(std::count(burn.texels().begin(), burn.texels().end(), std::uint8_t{200}), 0);
+  const auto texels = burn.atlas().texels();
+  EXPECT_EQ(std::count(texels.begin(), texels.end(), std::uint8_t{200}), 0);
+}
+
+TEST_F(SolidBurnTest, AChartHasTexelsWithinItsBoxOnly) {
+  SolidBurn burn(view_);
+  (void)burn.Apply(Patch(200));
+  const BurnAtlas atlas = burn.atlas();
+  (void)burn.Apply(Patch(255));
+  const BurnAtlas::Texel burnt{34, 200, 0, 255};
+  EXPECT_EQ(atlas.At(chart_, material_), burnt) << "a copy keeps its texels";
+  EXPECT_EQ(atlas.At(chart_, material_ + Vec2f(2 * kSolidCell_m, 0)), atlas.intact());
+
+  const SolidChart& chart = charts_.charts[chart_];
+  const Vec2f low = kSolidCell_m * Vec2f(static_cast<float>(chart.x), static_cast<float>(chart.y));
+  const Vec2f high = low + kSolidCell_m * Vec2f(static_cast<float>(chart.width), static_cast<float>(chart.height));
+  const Vec2f half = Vec2f::Constant(0.5f * kSolidCell_m);
+  EXPECT_TRUE(atlas.At(chart_, low + half));
+  EXPECT_TRUE(atlas.At(chart_, high - half));
+  EXPECT_FALSE(atlas.At(chart_, low - half));
+  EXPECT_FALSE(atlas.At(chart_, high + half));
+  EXPECT_FALSE(atlas.At(static_cast<Index>(charts_.charts.size()), material_)) << "there is no such chart";
 }
 
 TEST_F(SolidBurnTest, EverySurfaceTakesItsOwnPatchesOnly) {
@@ -155,7 +179,7 @@ TEST_F(SolidBurnTest, EverySurfaceTakesItsOwnPatchesOnly) {
   TemperaturePatch of_membrane = Patch(200);
   of_membrane.header.surface = BurntSurface::kMembrane;
   EXPECT_TRUE(burn.Apply(of_membrane).empty());
-  EXPECT_EQ(burn.width(), 0) << "the atlas was made for a patch of the membrane";
+  EXPECT_EQ(burn.atlas().width(), 0) << "the atlas was made for a patch of the membrane";
   Atlas atlas(view_);
   EXPECT_TRUE(atlas.Apply(Patch(200)).empty());
   EXPECT_EQ(atlas.touches(), 0u);

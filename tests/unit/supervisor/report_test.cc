@@ -93,6 +93,26 @@ TEST(SessionRecordTest, MissingNamesWhatTheScriptAskedFor) {
   EXPECT_NE(MissingFrom(record, {.deformation = true, .cut = true}).find("nothing was cut"), std::string::npos);
 }
 
+TEST(SessionRecordTest, ABurntOrganIsAnEffectAndAFigureOfItsName) {
+  SessionRecord record;
+  ThermalEvent event;
+  event.kind = ThermalEventKind::kSolidBurn;
+  for (const auto& [solid, m2] : {std::pair<std::uint8_t, float>{1, 4e-6f}, {1, 12.5e-6f}, {1, 9e-6f}, {7, 2e-6f}}) {
+    event.solid = solid;
+    event.value = m2;
+    record.AddEvent(event);
+  }
+  EXPECT_EQ(MissingFrom(record, {.deformation = true, .cut = true}), "");
+  SessionOutcome outcome;
+  outcome.solids = {"organ", "cystic duct"};
+  const std::vector<KeyFigure> figures = KeyFigures(outcome, record);
+  ASSERT_EQ(figures.size(), 2u);
+  EXPECT_EQ(figures[0].key, "burnt.cystic_duct_mm2");
+  EXPECT_EQ(figures[0].label, "burnt surface of cystic duct");
+  EXPECT_NEAR(figures[0].value, 12.5, 1e-4);
+  EXPECT_EQ(figures[1].key, "burnt.organ_mm2");  // Of no solid that the scene names.
+}
+
 // ------------------------------------------------------------------------------------------------ script outlook
 
 class ScriptTest : public ::testing::Test {

@@ -69,6 +69,7 @@ TEST_F(NodeOverSolid, ABurnGivesAPatchOfItsOwnAtlasAndAnEvent) {
     ++burns;
     EXPECT_LT((event.material - chart_.Material({0.02f, 0.015f, -0.02f})).norm(), 2e-3f);
     EXPECT_GE(event.value, 1e-6f);
+    EXPECT_EQ(event.solid, 0);
   }
   EXPECT_GE(burns, 1);
 

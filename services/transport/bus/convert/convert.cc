@@ -18,6 +18,7 @@ static_assert(idl::MAX_FOOTPRINT == kFootprintCells * kFootprintCells && idl::OP
 static_assert(idl::MAX_MEMBRANE_NODES == kMaxMembraneNodes && idl::MAX_EDGES == 3 * kMaxMembraneNodes);
 static_assert(idl::MAX_NODE_BYTES == kMaxMembraneNodes / 8 && idl::MAX_EDGE_BYTES == 3 * kMaxMembraneNodes / 8);
 static_assert(idl::EVENT_SOLID_BURN == static_cast<int>(ThermalEventKind::kSolidBurn));
+static_assert(idl::NO_SOLID == kNoSolid);
 static_assert(idl::SURFACE_SOLIDS == static_cast<int>(BurntSurface::kSolids));
 static_assert(idl::NODE_RECORDER == kNodeCount - 1 && idl::NODE_PHYSICS == static_cast<int>(NodeId::kPhysics));
 static_assert(idl::MODE_LOCK_STEP == static_cast<int>(SessionMode::kLockStep));
