@@ -23,13 +23,13 @@ struct ScoreSheet {
 struct SessionOutcome {
   std::string scene_name;
   std::string session_id;
-  std::string started_utc;    ///< "2024-05-01 12:34:56 UTC".
-  std::string machine;        ///< CPU model and count.
-  std::string configuration;  ///< Effective configuration, YAML.
-  std::vector<NodeId> nodes;  ///< Nodes of the session, in the order of their start.
+  std::string started_utc;          ///< "2024-05-01 12:34:56 UTC".
+  std::string machine;              ///< CPU model and count.
+  std::string configuration;        ///< Effective configuration, YAML.
+  std::vector<NodeId> nodes;        ///< Nodes of the session, in the order of their start.
   std::vector<std::string> solids;  ///< Names of the scene's solids; empty: it has one organ.
-  double duration_s = 0;      ///< Session time reached [s].
-  double wanted_s = 0;        ///< Session time requested [s]; 0: until stopped.
+  double duration_s = 0;            ///< Session time reached [s].
+  double wanted_s = 0;              ///< Session time requested [s]; 0: until stopped.
   ExitCode exit_code = ExitCode::kDone;
   /// First recording of all topics; each restart of the recorder adds a file beside it, "-2" and so on. Empty: none.
   std::filesystem::path recording;

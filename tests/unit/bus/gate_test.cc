@@ -148,8 +148,7 @@ TEST(GateRanges, CauteryContact) {
        {"a footprint beyond all sheets", [](auto& m) { m.footprint.x = -200'000'000; }},
        {"touching nothing", [](auto& m) { m.triangle = kNoIndex; }},
        {"on two surfaces", [](auto& m) { m.on_solid = true; }},
-       {"on no triangle of a solid",
-        [](auto& m) {
+       {"on no triangle of a solid", [](auto& m) {
           m.touching = false;
           m.on_solid = true;
           m.triangle = kNoIndex;
