@@ -148,7 +148,7 @@ std::size_t ThermalSolver::CheckpointCapacity(const SheetScene& scene) {
   const Sheet sheet = MakeSheet(scene);
   const std::size_t tiles = std::min(kTileCapacity, sheet.tile_count() * (sizeof(TileState) + 64));
   if (scene.thermal.model == ThermalModel::kPaper) return fixed + tiles + TexturePotential::StateBytes();
-  if (scene.thermal.volume == 0) return fixed + tiles;
+  if (scene.thermal.volume == 0 || sheet.tile_count() == 0) return fixed + tiles;
   const std::size_t bricks = VolumeField(sheet, scene.thermal).brick_count();
   constexpr std::size_t kBrickBytes = 2 * sizeof(float) * kBrickCells + 64;
   return fixed + tiles + std::min(kVolumeCapacity, bricks * kBrickBytes + 128);

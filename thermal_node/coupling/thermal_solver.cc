@@ -36,7 +36,7 @@ ThermalSolver::ThermalSolver(const SheetScene& scene)
   if (scene.thermal.model == ThermalModel::kPaper) paper_ = std::make_unique<PaperModel>(scene, field_.sheet());
   events_.reserve(64);
   alarms_.reserve(16);
-  if (params_.volume != 0 && paper_ == nullptr) {
+  if (params_.volume != 0 && paper_ == nullptr && field_.sheet().tile_count() > 0) {
     volume_ = std::make_unique<VolumeField>(field_.sheet(), params_);
     contact_ = std::make_unique<SheetContact>(material_, volume_->material());
     source_.KeepLeak();

@@ -62,7 +62,7 @@ struct SolverFigures {
 
 class ThermalSolver {
  public:
-  /// Throws InputError when the scene has no usable membrane or parameters.
+  /// A scene without a membrane is always at rest. Throws InputError when its membrane or parameters are not usable.
   explicit ThermalSolver(const SheetScene& scene);
   ThermalSolver(const ThermalSolver&) = delete;  // members hold references to each other
   ThermalSolver& operator=(const ThermalSolver&) = delete;

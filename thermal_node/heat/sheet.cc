@@ -223,6 +223,7 @@ bool Sheet::OnSheet(const Vec2f& material) const {
 
 Sheet MakeSheet(const SheetScene& scene) {
   const MembraneGrid& grid = scene.membrane;
+  if (grid.rows == 0 && grid.cols == 0) return MakeEmpty(Vec2f::Zero(), Vec2f::Zero(), scene.thermal.cell_m);
   if (grid.rows < 2 || grid.cols < 2 || scene.membrane_material.size() != grid.node_count() ||
       scene.rest_position.size() < grid.first + grid.node_count()) {
     throw InputError("scene '" + std::string(scene.name) + "': thermal_node needs a membrane grid of at least 2 x 2");

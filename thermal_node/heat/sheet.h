@@ -56,8 +56,8 @@ struct Sheet {
   [[nodiscard]] bool OnSheet(const Vec2f& material) const;
 };
 
-/// Throws InputError when the scene has no membrane, or its material coordinates are not finite or are larger than the
-/// atlas.
+/// Without cells for a scene without a membrane. Throws InputError when the grid is no grid, or its material
+/// coordinates are not finite or are larger than the atlas.
 [[nodiscard]] Sheet MakeSheet(const SheetScene& scene);
 /// The charts of the solids, with cells of kSolidCell_m.
 [[nodiscard]] Sheet MakeSolidSheet(const TissueScene& scene, const SolidCharts& charts);

@@ -378,11 +378,12 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const MaterialLibr
       root.Fail("assessment", "`line` lies on a sheet, and the scene has none");
     }
   }
-  // Only sheets can be burnt.
-  if (!has_sheets) scene.node_mask &= ~(1u << static_cast<unsigned>(NodeId::kThermal));
+  const bool burns =
+      has_sheets || (FindTool(scene.tools, ToolKind::kHook).has_value() && scene.thermal.model != ThermalModel::kPaper);
+  if (!burns) scene.node_mask &= ~(1u << static_cast<unsigned>(NodeId::kThermal));
   scene.node_mask = ReadNodes(&root, scene.node_mask);
-  if (!has_sheets && (scene.node_mask >> static_cast<unsigned>(NodeId::kThermal) & 1u) != 0) {
-    root.Fail("nodes", "thermal_node needs a sheet, and the scene has none");
+  if (!burns && (scene.node_mask >> static_cast<unsigned>(NodeId::kThermal) & 1u) != 0) {
+    root.Fail("nodes", "thermal_node needs a sheet, or a hook and a model of heat other than the paper's");
   }
   yaml->Finish();
   return {scene, yaml->Effective(), yaml->Rules()};

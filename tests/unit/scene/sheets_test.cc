@@ -206,6 +206,9 @@ TEST(Sheets, AScenesTissueMayBeBodiesOnly) {
   EXPECT_EQ(scene.node_mask & (1u << static_cast<unsigned>(NodeId::kThermal)), 0u) << "nothing can be burnt";
   EXPECT_NE(RefusalOf(std::string(kPad) + "nodes: [physics_node, thermal_node]\n").find("needs a sheet"),
             std::string::npos);
+  // A hook burns the body.
+  const SceneData hooked = Build(std::string(kPad) + "tools:\n  tool1: {kind: hook, trocar_mm: [90, -30, 160]}\n");
+  EXPECT_NE(hooked.fixed.node_mask & (1u << static_cast<unsigned>(NodeId::kThermal)), 0u);
 }
 
 TEST(Sheets, AScenesTissueMayBeASheetOnly) {

@@ -130,6 +130,26 @@ TEST_F(NodeOverSolid, WithoutContactTheStateHashIsThatOfTheMembraneAlone) {
   EXPECT_NE(NewestManifest().state_hash, node->solver().TickHash());
 }
 
+TEST_F(NodeOverSolid, NeedsNoMembrane) {
+  data_.membrane_material.clear();
+  data_.membrane_rest_length.clear();
+  data_.fixed.membrane.rows = data_.fixed.membrane.cols = 0;
+  scene_ = data_.View();
+  OpenCheckpoint();
+  auto node = MakeNode();
+  for (int n = 0; n < 60; ++n) Burn(node.get(), 0.02f);
+  const float before = node->solids()->dead_m2();
+  EXPECT_GT(before, 0.0f);
+  const auto topology = NewestTopology();
+  ASSERT_TRUE(topology);
+  EXPECT_TRUE(bus::PassesGate(*topology));
+  node.reset();
+  OpenCheckpoint();
+  node = MakeNode();
+  EXPECT_TRUE(node->restored());
+  EXPECT_NEAR(node->solids()->dead_m2(), before, 0.2f * before);
+}
+
 TEST_F(NodeOverSolid, BadSamplesAreRefusedAndCounted) {
   auto node = MakeNode();
   CauteryContact contact = TouchAt({1.5f, 0.1f}, 5e-4f);
