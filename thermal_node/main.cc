@@ -1,4 +1,4 @@
-// thermal_node: electrocautery of the membrane.
+// thermal_node: electrocautery of membrane and organs.
 #include "services/base/runtime/checkpoint.h"
 #include "services/base/runtime/cyclic_thread.h"
 #include "services/nodes/app/node_app.h"
@@ -31,6 +31,6 @@ ExitCode RunThermal(app::NodeApp& app) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return app::NodeMain(argc, argv, NodeId::kThermal, "Heats and cuts the membrane; publishes topology and temperature.",
-                       RunThermal);
+  return app::NodeMain(argc, argv, NodeId::kThermal,
+                       "Heats membrane and organs, cuts the membrane; publishes topology and temperature.", RunThermal);
 }

@@ -1,11 +1,18 @@
 #include "physics_node/contact_model/solid_probe.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "physics_node/collision/tool_shape.h"
 
 namespace fulcrum::physics {
+namespace {
+
+/// The metal changes to another chart if that is nearer by this [m].
+constexpr float kNearerChart = 1.0e-4f;
+
+}  // namespace
 
 SolidProbe::SolidProbe(const TissueScene& scene, const ParticleStore* particles)
     : scene_(scene),
@@ -26,7 +33,11 @@ SurfaceTriangle SolidProbe::At(Index triangle) const {
 
 SolidProbe::Nearest SolidProbe::FindNear(std::uint32_t tool, const ToolCollision& collision) {
   near_.clear();
-  Nearest nearest;
+  Nearest nearest, on_last;
+  const auto take = [](const ContactPair& pair, Index triangle, Nearest* least) {
+    if (least->triangle != kNoIndex && pair.closest.distance_sq >= least->distance_sq) return;
+    *least = {triangle, pair.closest.barycentric, pair.closest.distance_sq};
+  };
   for (const ContactPair& pair : collision.pairs()) {
     // ShapeOf: the hook's first capsule is the foot, its second the neck.
     if (pair.capsule / kMaxCapsules != tool || pair.capsule % kMaxCapsules > 1 ||
@@ -36,13 +47,15 @@ SolidProbe::Nearest SolidProbe::FindNear(std::uint32_t tool, const ToolCollision
     const Index triangle = pair.triangle - collision.membrane_triangle_count();
     if (charts_.of_triangle[triangle] == kNoIndex) continue;
     near_.push_back(triangle);
-    if (nearest.triangle == kNoIndex || pair.closest.distance_sq < nearest.distance_sq) {
-      nearest = {triangle, pair.closest.barycentric, pair.closest.distance_sq};
-    }
+    take(pair, triangle, &nearest);
+    if (was_touching_ && charts_.of_triangle[triangle] == last_chart_) take(pair, triangle, &on_last);
   }
   std::sort(near_.begin(), near_.end());
   near_.erase(std::unique(near_.begin(), near_.end()), near_.end());
-  return nearest;
+  // Over a border the metal stays with its chart, instead of changing with each step.
+  const bool stays =
+      on_last.triangle != kNoIndex && std::sqrt(on_last.distance_sq) < std::sqrt(nearest.distance_sq) + kNearerChart;
+  return stays ? on_last : nearest;
 }
 
 void SolidProbe::Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision, float step_s,

@@ -185,8 +185,7 @@ void RenderNode::TakeThermal() {
 
 void RenderNode::Apply(const TemperaturePatch& patch) {
   if (!view_.ApplyPatch(patch)) return;
-  temperature_C_ = patch.header.max_temperature_C;
-  temperature_time_s_ = session_time_s_;
+  heat_[static_cast<std::size_t>(patch.header.surface)] = {session_time_s_, patch.header.max_temperature_C};
   patches_applied_.fetch_add(1, std::memory_order_relaxed);
   changed_on_screen_ = changed_in_file_ = true;
 }
@@ -225,7 +224,7 @@ void RenderNode::UpdateTexts() {
   hud_.pedals = handles_.pedals;
   hud_.force_limit_N = ForceLimit(scene_);
   hud_.slit_m = topology_.cut_length_m;
-  hud_.tip_C = Recent(temperature_time_s_) ? std::optional(temperature_C_) : std::nullopt;
+  hud_.tip_C = HottestRecent();
   for (std::size_t k = 0; k < kMaxTools; ++k) {
     const bool there = TouchesTissue(tools_.tools[k].kind);
     hud_.force_N[k] = there ? std::optional(force_N_[k]) : std::nullopt;
@@ -269,7 +268,8 @@ void RenderNode::TakeContact() {
     return;
   }
   // Events report the first steam at a place only; steam continues while power is delivered to boiling tissue.
-  const bool boils = hud_.power_W > 0 && temperature_C_ > kBoils_C && Recent(temperature_time_s_);
+  const Heat& heat = heat_[contact_.on_solid ? 1 : 0];
+  const bool boils = hud_.power_W > 0 && heat.highest_C > kBoils_C && Recent(heat.time_s);
   if (boils && (contact_.touching || contact_.on_solid)) {
     const Vec3f p_W = contact_.on_solid ? tools_.tools[contact_.tool].p_WT : view_.OnMembrane(contact_.material);
     view_.AddSmokeAt(p_W, session_time_s_);

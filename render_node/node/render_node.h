@@ -1,6 +1,7 @@
 // The render node: draws pictures from the samples of its ports, in a window or in PNG files.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -8,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <tuple>
 
@@ -128,6 +130,14 @@ class RenderNode {
   enum class ReadBack { kIfStreamed, kAlways };
   void Draw(double session_time_s, bool write_png, ReadBack read = ReadBack::kIfStreamed);
   void NoteLatency(double draw_ms);
+  /// Highest temperature of what was hot lately; none if nothing was.
+  [[nodiscard]] std::optional<float> HottestRecent() const {
+    std::optional<float> hottest;
+    for (const Heat& heat : heat_) {
+      if (Recent(heat.time_s)) hottest = std::max(hottest.value_or(heat.highest_C), heat.highest_C);
+    }
+    return hottest;
+  }
   void Report(const std::string& error);
 
   using PatchPlace = std::tuple<BurntSurface, std::uint32_t, std::uint32_t>;  // And origin in its atlas.
@@ -179,8 +189,11 @@ class RenderNode {
   std::array<Arrival, 3> arrivals_{{{"TISSUE HELD", -1}, {"TOOLS HELD", -1}, {"HANDLES LATE", -1}}};
   double session_time_s_ = 0;
   double next_png_s_ = 0;
-  double temperature_time_s_ = -1e9;            // Session time of the newest patch.
-  float temperature_C_ = 0;                     // Hottest texel of that patch.
+  struct Heat {
+    double time_s = -1e9;  // Session time of the newest patch.
+    float highest_C = 0;   // Hottest texel of that patch.
+  };
+  std::array<Heat, 2> heat_;                    // By BurntSurface.
   std::array<double, 2> warned_s_{-1e9, -1e9};  // Ureter and nerve: session time of the last warning …
   std::array<bool, 2> injured_{};               // … and whether one was an injury.
   bool changed_on_screen_ = false;              // Since the last picture that was drawn.

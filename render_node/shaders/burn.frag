@@ -20,12 +20,12 @@ void main() {
   // Before any branch, which derivatives require.
   vec3 px = dFdx(position), py = dFdy(position);
   vec2 mx = dFdx(m), my = dFdy(m);
+  vec4 noise = texture(serosa_pattern, m * 16.0);
   vec4 heat = texture(burn_atlas, m * burn_per_metre);
   // Most of a chart is intact. Beyond its box lies another chart, with triangles of its own here.
   bool beyond = any(lessThan(m, colour.xy)) || any(greaterThan(m, colour.zw));
   if (beyond || (max(heat.g, heat.b) < 0.008 && heat.a > 0.99)) discard;
 
-  vec4 noise = texture(serosa_pattern, m * 16.0);
   vec3 bend = noise.rgb - 0.5;
   float damage = heat.g * (0.85 + 0.3 * noise.g); // So that a border is ragged.
   float dry = clamp(2.0 * heat.b, 0.0, 1.0);

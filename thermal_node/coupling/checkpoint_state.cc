@@ -315,6 +315,14 @@ std::size_t SolidSurface::Save(std::span<std::byte> out) const {
   return writer.used();
 }
 
+std::size_t SolidSurface::SaveNothing(std::span<std::byte> out) {
+  Writer writer(out);
+  Record record{};
+  record.layout = kSolidLayout;
+  writer.PutValue(record);
+  return writer.used();
+}
+
 bool SolidSurface::Restore(std::span<const std::byte> bytes) {
   Reader reader(bytes);
   Record record;

@@ -41,14 +41,18 @@ SolidSurface::SolidSurface(const TissueScene& scene, SolidCharts charts)
       damage_(material_.body_C),
       source_(material_, field_.sheet()),
       charts_(std::move(charts)),
-      charts_of_tile_(static_cast<std::size_t>(field_.sheet().tile_count())) {}
+      charts_of_tile_(static_cast<std::size_t>(field_.sheet().tile_count())) {
+  const std::vector<Index>& of = charts_.of_triangle;
+  const auto without = std::count(of.begin(), of.end(), kNoIndex);
+  left_out_ = of.empty() ? 0.0f : static_cast<float>(without) / static_cast<float>(of.size());
+}
 
 bool SolidSurface::Step(std::span<const TipInput> tips, float dt_s, Interface* hook) {
   burns_.clear();
   const bool acts =
       std::any_of(tips.begin(), tips.end(), [&](const TipInput& tip) { return Acts(tip, hook->hook_theta); });
   if (!acts && field_.idle()) {
-    power_W_ = 0;
+    power_W_ = set_power_W_ = voltage_V_ = 0;
     return false;
   }
   ++frame_;
@@ -64,8 +68,13 @@ bool SolidSurface::Step(std::span<const TipInput> tips, float dt_s, Interface* h
     if (!damage_.Update(tile, dt_s)) field_.QuarantineBadDamage(tile, &ledger_);
   }
   if (acts) *hook = source_.interface();
-  const float time_s = Duration(tips, dt_s);
-  power_W_ = time_s > 0 ? static_cast<float>(ledger_.generator - before_J) / time_s : 0.0f;
+  if (!tips.empty()) {
+    power_W_ = static_cast<float>(ledger_.generator - before_J) / Duration(tips, dt_s);
+    set_power_W_ = tips.back().active ? tips.back().power_W : 0.0f;
+    voltage_V_ = tips.back().active ? source_.stats().voltage_V : 0.0f;
+    if (Acts(tips.back(), hook->hook_theta)) place_ = tips.back().path.to;
+  }
+  shortened_ += source_.stats().shortened ? 1 : 0;
   highest_C_ = std::max(highest_C_, material_.body_C + field_.MaxTheta());
   if (frame_ % kMeasureFrames == 0) MeasureBurns();
   return true;
@@ -116,10 +125,31 @@ void SolidSurface::MeasureBurns() {
     dead_m2_[solid] = static_cast<float>(cells[solid]) * kSolidCell_m * kSolidCell_m;
     float& reported_m2 = reported_m2_[solid];
     if (dead_m2_[solid] < reported_m2 + kReported_m2) continue;
-    burns_.push_back({solid, reported_m2 == 0.0f, field_.sheet().CentreOf(where[solid]),
-                      material_.body_C + field_.MaxTheta(), dead_m2_[solid]});
+    const Vec2f at = SolidAt(place_) == solid ? place_ : field_.sheet().CentreOf(where[solid]);
+    burns_.push_back({solid, reported_m2 == 0.0f, at, material_.body_C + field_.MaxTheta(), dead_m2_[solid]});
     reported_m2 = dead_m2_[solid];
   }
+}
+
+namespace {
+
+bool InBox(const SolidChart& chart, const Vec2f& material) {
+  const Vec2f cell = material / kSolidCell_m - Vec2f(static_cast<float>(chart.x), static_cast<float>(chart.y));
+  return cell.x() >= 0 && cell.y() >= 0 && cell.x() <= static_cast<float>(chart.width) &&
+         cell.y() <= static_cast<float>(chart.height);
+}
+
+}  // namespace
+
+bool SolidSurface::IsOn(Index triangle, const Vec2f& material) const {
+  const Index chart = ChartOf(triangle);
+  return chart != kNoIndex && InBox(charts_.charts[chart], material);
+}
+
+Index SolidSurface::SolidAt(const Vec2f& material) const {
+  const auto here = std::find_if(charts_.charts.begin(), charts_.charts.end(),
+                                 [&](const SolidChart& chart) { return InBox(chart, material); });
+  return here != charts_.charts.end() ? here->solid : kNoIndex;
 }
 
 float SolidSurface::dead_m2() const { return std::accumulate(dead_m2_.begin(), dead_m2_.end(), 0.0f); }
@@ -131,7 +161,8 @@ void SolidSurface::Clear() {
   ledger_ = {};
   burns_.clear();
   frame_ = 0;
-  power_W_ = highest_C_ = 0;
+  power_W_ = set_power_W_ = voltage_V_ = highest_C_ = 0;
+  shortened_ = 0;
   dead_m2_ = reported_m2_ = {};
 }
 

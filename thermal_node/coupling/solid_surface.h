@@ -51,12 +51,19 @@ class SolidSurface {
   [[nodiscard]] Index ChartOf(Index triangle) const {
     return triangle < charts_.of_triangle.size() ? charts_.of_triangle[triangle] : kNoIndex;
   }
+  /// Whether a place lies in the box of a triangle's chart; false for a triangle without one.
+  [[nodiscard]] bool IsOn(Index triangle, const Vec2f& material) const;
+  /// Share of the triangles that have no chart, because the atlas is full.
+  [[nodiscard]] float left_out() const { return left_out_; }
   [[nodiscard]] const HeatField& field() const { return field_; }
   [[nodiscard]] HeatField* mutable_field() { return &field_; }
   [[nodiscard]] const Ledger& ledger() const { return ledger_; }
-  /// Power that the generator delivers to solids, mean over the last frame [W].
+  /// Power that the generator delivers to solids, mean over the time of the last samples, and what is set there [W].
   [[nodiscard]] float power_W() const { return power_W_; }
-  [[nodiscard]] float voltage_V() const { return power_W_ > 0 ? source_.stats().voltage_V : 0.0f; }
+  [[nodiscard]] float set_power_W() const { return set_power_W_; }
+  [[nodiscard]] float voltage_V() const { return voltage_V_; }
+  /// Frames in which the metal did not fit into the potential's window; see kMetalReach.
+  [[nodiscard]] std::uint32_t shortened() const { return shortened_; }
   [[nodiscard]] float highest_C() const { return highest_C_; }
   /// Area of dead surface (cell death, Omega >= 1) of all solids since the start [m^2]; updated every tenth frame.
   [[nodiscard]] float dead_m2() const;
@@ -72,6 +79,8 @@ class SolidSurface {
   [[nodiscard]] static std::size_t CheckpointCapacity();
   /// Returns the bytes used; 0 when `out` is too small.
   [[nodiscard]] std::size_t Save(std::span<std::byte> out) const;
+  /// The same of tissue that was never heated.
+  [[nodiscard]] static std::size_t SaveNothing(std::span<std::byte> out);
   /// Returns false, and leaves a fresh state, if no solver can have written the bytes.
   [[nodiscard]] bool Restore(std::span<const std::byte> bytes);
   /// Back to tissue that was never heated.
@@ -82,6 +91,8 @@ class SolidSurface {
   SolidSurface(const TissueScene& scene, SolidCharts charts);
   void ApplySource(std::span<const TipInput> tips, float dt_s, float from, float to);
   void MeasureBurns();
+  /// Solid of a place in the charts; kNoIndex: none.
+  [[nodiscard]] Index SolidAt(const Vec2f& material) const;
   /// Adds the dead area of a tile to that of its solids, in cells, and where the last dead cell of each lies.
   void AddDead(const Tile& tile, std::array<double, kMaxSolids>* cells, std::array<CellIndex, kMaxSolids>* where);
 
@@ -96,7 +107,9 @@ class SolidSurface {
   using BySolid = std::array<float, kMaxSolids>;
   std::vector<SolidBurn> burns_;
   std::uint64_t frame_ = 0;  ///< Frames in which something was computed.
-  float power_W_ = 0, highest_C_ = 0;
+  float power_W_ = 0, set_power_W_ = 0, voltage_V_ = 0, highest_C_ = 0, left_out_ = 0;
+  std::uint32_t shortened_ = 0;
+  Vec2f place_ = Vec2f::Zero();  ///< Of the last sample that heated [m].
   BySolid dead_m2_{}, reported_m2_{};
 };
 

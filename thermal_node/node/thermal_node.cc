@@ -21,6 +21,8 @@ struct NodeState {
   TipTracker::State tip, solid_tip;
   GeneratorInputs::State generator;
   std::uint64_t solver_bytes;  ///< The rest is that of the solids.
+  Index solid_chart;
+  std::uint32_t unused;
 };
 
 /// A sample as the solids see it.
@@ -98,7 +100,7 @@ void ThermalNode::StepSolids(double dt_s) {
   Interface hook = solver_.source()->interface();
   solids_stepped_ = solids_->Step(solid_tips_, static_cast<float>(dt_s), &hook);
   if (solids_stepped_) solver_.source()->SetInterface(hook);
-  if (before && !solids_stepped_) NoteHealth();  // No more current.
+  if (before && !solids_stepped_) NoteHealth();  // Once more, with the power 0.
 }
 
 void ThermalNode::TakeGeneratorInputs(const Tick& tick) {
@@ -113,7 +115,9 @@ void ThermalNode::TakeGeneratorInputs(const Tick& tick) {
 }
 
 bool ThermalNode::Accepts(const CauteryContact& sample) const {
-  return tracker_.Accepts(sample) && (!solid_tracker_ || solid_tracker_->Accepts(OfSolids(sample)));
+  if (!tracker_.Accepts(sample)) return false;
+  if (!sample.on_solid || !solid_tracker_) return true;
+  return solid_tracker_->Accepts(OfSolids(sample)) && solids_->IsOn(sample.triangle, sample.material);
 }
 
 void ThermalNode::TakeContacts(const Tick& tick) {
@@ -143,7 +147,7 @@ void ThermalNode::TakeContacts(const Tick& tick) {
   }
 }
 
-/// Charts that are neighbours in the atlas are not on the solid.
+/// Charts that are neighbours in the atlas need not be neighbours on the solid.
 TipInput ThermalNode::AdvanceOnSolids(const CauteryContact& sample, const GeneratorDemand& demand, double dt_s) {
   if (sample.on_solid) {
     const Index chart = solids_->ChartOf(sample.triangle);
@@ -177,6 +181,7 @@ bool ThermalNode::Restore(std::span<const std::byte> checkpoint) {
     if (solids_ != nullptr) solids_->Clear();
     return false;
   }
+  solid_chart_ = state.solid_chart;
   return tracker_.Restore(state.tip) && generator_.Restore(state.generator) &&
          (!solid_tracker_ || solid_tracker_->Restore(state.solid_tip));
 }
@@ -201,15 +206,19 @@ void ThermalNode::SaveCheckpoint() {
   if (!due || (solver_.stepped() && !solver_.at_commit_frame())) return;
   const std::span<std::byte> slot = checkpoint_->Begin();
   const std::span<std::byte> room = slot.subspan(sizeof(NodeState));
-  const std::size_t bytes = solver_.Save(room);
-  const std::size_t solid_bytes = bytes > 0 && solids_ != nullptr ? solids_->Save(room.subspan(bytes)) : 0;
+  const std::size_t solids_room = solids_ != nullptr ? SolidSurface::CheckpointCapacity() : 0;
+  const std::size_t bytes = solver_.Save(room.first(room.size() - solids_room));
+  std::size_t solid_bytes = bytes > 0 && solids_ != nullptr ? solids_->Save(room.subspan(bytes)) : 0;
   checkpoint_full_ = bytes == 0 || (solids_ != nullptr && solid_bytes == 0);
-  if (!checkpoint_full_) {
+  // Without room for the solids' burns the membrane is saved all the same.
+  if (bytes > 0 && checkpoint_full_) solid_bytes = SolidSurface::SaveNothing(room.subspan(bytes));
+  if (bytes > 0) {
     NodeState state{};
     state.tip = tracker_.Save();
     if (solid_tracker_) state.solid_tip = solid_tracker_->Save();
     state.generator = generator_.Save();
     state.solver_bytes = bytes;
+    state.solid_chart = solid_chart_;
     std::memcpy(slot.data(), &state, sizeof(state));
     checkpoint_->Commit(sizeof(state) + bytes + solid_bytes);
   }
@@ -249,7 +258,9 @@ void ThermalNode::PublishEvents(const Tick& tick) {
     PublishEvent(tick, event, static_cast<std::uint8_t>(burn.solid));
     // The damage integral of dead surface is 1.
     const std::optional<ThermalEventKind> injury = InjuryOf(burn.solid);
-    if (burn.first && injury) PublishEvent(tick, {*injury, burn.material, burn.temperature_C, 1.0f});
+    if (burn.first && injury) {
+      PublishEvent(tick, {*injury, burn.material, burn.temperature_C, 1.0f}, static_cast<std::uint8_t>(burn.solid));
+    }
   }
 }
 
@@ -361,7 +372,8 @@ void ThermalNode::NoteHealth() {
     f.solver.present_C = std::max(f.solver.present_C, scene_.thermal.body_temperature_C + solids_->field().MaxTheta());
     f.solver.power_W += solids_->power_W();
     f.solver.voltage_V = std::max(f.solver.voltage_V, solids_->voltage_V());
-    if (!solid_tips_.empty() && solid_tips_.back().active) f.solver.set_power_W = solid_tips_.back().power_W;
+    f.solver.set_power_W = std::max(f.solver.set_power_W, solids_->set_power_W());
+    f.solver.shortened += solids_->shortened();
   }
   // The sum over all cells takes as long as a substep of conduction, so it is not computed in every tick.
   if (ticks_ % kTicksPerClosure == 0) {
@@ -370,7 +382,8 @@ void ThermalNode::NoteHealth() {
   }
   f.closure = closure_;
   f.revision = solver_.topology().revision();
-  f.quarantined = solver_.field().quarantined();
+  f.quarantined = solver_.field().quarantined() + (solids_ != nullptr ? solids_->field().quarantined() : 0);
+  f.no_place = solids_ != nullptr && solids_->left_out() > 0.0f ? 1 : 0;
   f.refused = refused_;
   f.dead_edges = solver_.topology().dead_edge_count();
   f.dead_nodes = solver_.topology().dead_node_count();
@@ -411,6 +424,9 @@ void ThermalNode::FillHealth(Health* health) const {
   if (f.solver.shortened > 0) {
     health->last_error =
         "metal longer than the window of the potential: shortened in " + std::to_string(f.solver.shortened) + " frames";
+  }
+  if (f.no_place != 0) {
+    health->last_error = "part of the organs' surface cannot be burnt: their surface is larger than its atlas";
   }
   if (f.no_setting != 0) {
     health->last_error = "a pedal is down, but no GeneratorSetting has come: no current. The supervisor sends it";

@@ -103,7 +103,7 @@ class ThermalNode {
     SolverFigures solver;
     double delivered_J, closure;
     std::uint64_t revision, quarantined, refused;
-    std::uint32_t dead_edges, dead_nodes, awake_tiles, checkpoint_full, no_setting;
+    std::uint32_t dead_edges, dead_nodes, awake_tiles, checkpoint_full, no_setting, no_place;
     float cut_length_m;
     float solids_dead_m2;
   };

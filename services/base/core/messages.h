@@ -345,12 +345,13 @@ struct ThermalEvent {
   Stamp stamp;
   double session_time_s = 0;
   ThermalEventKind kind = ThermalEventKind::kContact;
-  Vec2f material = Vec2f::Zero();  ///< Place on the membrane (s, t), for kSolidBurn in the charts of the solids [m].
+  Vec2f material = Vec2f::Zero();  ///< Place on the membrane (s, t), with `solid` in the charts of the solids [m].
   float temperature_C = 0;
   /// Kind-specific: cut length so far [m] for kCut, damage integral for injuries, the solid's dead area [m^2] for
   /// kSolidBurn.
   float value = 0;
-  std::uint8_t solid = kNoSolid;  ///< For kSolidBurn: index in TissueScene::solids, 0 in a scene of one organ.
+  /// What was burnt, for kSolidBurn and injuries by it: index in TissueScene::solids, 0 in a scene of one organ.
+  std::uint8_t solid = kNoSolid;
   std::uint64_t topology_revision = 0;
 };
 

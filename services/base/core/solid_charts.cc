@@ -1,6 +1,7 @@
 #include "services/base/core/solid_charts.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <optional>
@@ -89,17 +90,18 @@ class Cutter {
     const Vec3f n = normal.isZero() ? Vec3f(Vec3f::UnitZ()) : normal;
     chart.s_axis = n.unitOrthogonal();
     chart.t_axis = n.cross(chart.s_axis);
+    ++stamp_;
     std::vector<Index> part{seed};
-    std::vector<std::uint8_t>& seen = seen_;
-    seen.assign(triangles_.size(), 0);
-    seen[seed] = 1;
+    seen_[seed] = stamp_;
+    const Vec2f middle = Projected(chart, triangles_[seed][0]);
+    (void)Cover(chart, middle, seed);
     Box box = With(Box{}, chart, seed);
     for (std::size_t next = 0; next < part.size(); ++next) {
       for (const Index t : beyond_[part[next]]) {
-        if (t == kNoIndex || seen[t] != 0 || taken[t] != kNoIndex || normals_[t].dot(n) < kLeastCosine) continue;
-        seen[t] = 1;
+        if (t == kNoIndex || seen_[t] == stamp_ || taken[t] != kNoIndex || normals_[t].dot(n) < kLeastCosine) continue;
+        seen_[t] = stamp_;
         const Box larger = With(box, chart, t);
-        if (larger.extent().maxCoeff() > kMostExtent_m) continue;
+        if (larger.extent().maxCoeff() > kMostExtent_m || !Cover(chart, middle, t)) continue;
         box = larger;
         part.push_back(t);
       }
@@ -110,17 +112,54 @@ class Cutter {
     chart.height = texels(box.extent().y());
     return {chart, std::move(part)};
   }
+  [[nodiscard]] Vec2f Projected(const SolidChart& chart, Index vertex) const {
+    return {chart.s_axis.dot(At(vertex)), chart.t_axis.dot(At(vertex))};
+  }
   [[nodiscard]] Box With(Box box, const SolidChart& chart, Index triangle) const {
-    for (const Index v : triangles_[triangle]) box = box.With({chart.s_axis.dot(At(v)), chart.t_axis.dot(At(v))});
+    for (const Index v : triangles_[triangle]) box = box.With(Projected(chart, v));
     return box;
   }
+  /// Takes the cells of a triangle, those with their middle well inside. Returns false, and takes none, if one is
+  /// taken: there the surface lies over another part of its chart.
+  bool Cover(const SolidChart& chart, const Vec2f& middle, Index triangle) {
+    std::array<Vec2f, 3> p;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec2f from_middle = Projected(chart, triangles_[triangle][k]) - middle;
+      p[k] = from_middle / kSolidCell_m + Vec2f::Constant(0.5f * kCoverCells);
+    }
+    const Vec2f low = p[0].cwiseMin(p[1]).cwiseMin(p[2]), high = p[0].cwiseMax(p[1]).cwiseMax(p[2]);
+    const Vec2f e1 = p[1] - p[0], e2 = p[2] - p[0];
+    const float area = e1.x() * e2.y() - e1.y() * e2.x();
+    if (!(std::abs(area) > 0.0f)) return true;
+    cells_.clear();
+    for (int y = std::max(0, static_cast<int>(low.y())); y <= std::min(high.y(), kCoverCells - 1.0f); ++y) {
+      for (int x = std::max(0, static_cast<int>(low.x())); x <= std::min(high.x(), kCoverCells - 1.0f); ++x) {
+        const Vec2f d = Vec2f(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) - p[0];
+        const float u = (d.x() * e2.y() - d.y() * e2.x()) / area, v = (e1.x() * d.y() - e1.y() * d.x()) / area;
+        constexpr float kInside = 1e-3f;
+        if (u < kInside || v < kInside || u + v > 1 - kInside) continue;
+        const std::size_t cell = static_cast<std::size_t>(y) * kCoverCells + static_cast<std::size_t>(x);
+        if (covered_[cell] == stamp_) return false;
+        cells_.push_back(cell);
+      }
+    }
+    for (const std::size_t cell : cells_) covered_[cell] = stamp_;
+    return true;
+  }
+
+  /// Edge of the square of cells around a seed that its chart can reach.
+  static constexpr int kCoverCells = 2 * static_cast<int>(kMostExtent_m / kSolidCell_m) + 4;
 
   const TissueScene& scene_;
   std::span<const Triangle> triangles_;
   std::vector<std::array<Index, 3>> beyond_;
   std::vector<Index> solid_of_;  ///< By vertex.
   std::vector<Vec3f> areas_, normals_;
-  std::vector<std::uint8_t> seen_;
+  // By triangle, and by cell of the square: the number of the growth that has seen or covered it.
+  std::vector<std::uint32_t> seen_ = std::vector<std::uint32_t>(triangles_.size(), 0);
+  std::vector<std::uint32_t> covered_ = std::vector<std::uint32_t>(std::size_t{kCoverCells} * kCoverCells, 0);
+  std::uint32_t stamp_ = 0;
+  std::vector<std::size_t> cells_;  ///< Scratch.
 };
 
 /// Puts the charts into rows, the tallest first. Those that do not fit lose their triangles.

@@ -55,7 +55,7 @@ Names NamesOf(ThermalEventKind kind) {
     case ThermalEventKind::kQuarantine:
       return {"region_reset", "Region reset"};
     case ThermalEventKind::kSolidBurn:
-      return {"organ_burn", "Organ burnt"};
+      return {"organ_burnt", "Organ burnt"};
   }
   return {"unknown", "Unknown event"};
 }

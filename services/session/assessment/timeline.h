@@ -39,7 +39,7 @@ struct Happening {
 [[nodiscard]] std::string TextOf(const Happening& happening);
 /// Name of the kind in files and on the page: "touch", "grasp", "release", "pedal_cut", "pedal_coag", "pedal_blend",
 /// "force", "slip", "current", "blanching", "steam", "cut", "charring", "ureter_warning", "ureter_injury",
-/// "nerve_warning", "nerve_injury", "region_reset", "organ_burn".
+/// "nerve_warning", "nerve_injury", "region_reset", "organ_burnt".
 [[nodiscard]] const char* KeyOf(const Happening& happening);
 
 /// Takes each message in the order of its writer. The order between topics does not matter.

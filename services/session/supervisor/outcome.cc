@@ -69,7 +69,9 @@ std::vector<KeyFigure> KeyFigures(const SessionOutcome& outcome, const SessionRe
                        source.at_end ? record.last(source.key) : record.peak(source.key)});
   }
   for (const auto& [solid, m2] : record.burnt_m2()) {
-    const std::string name = solid < outcome.solids.size() ? outcome.solids[solid] : "organ";
+    const std::string name = solid < outcome.solids.size()          ? outcome.solids[solid]
+                             : outcome.solids.empty() && solid == 0 ? "organ"
+                                                                    : "solid " + std::to_string(solid);
     std::string key = "burnt." + name + "_mm2";
     std::replace(key.begin(), key.end(), ' ', '_');
     figures.push_back({key, "burnt surface of " + name, "mm²", 1, 1e6 * m2});

@@ -63,8 +63,10 @@ ScriptDemands DemandsUntil(const SceneView& scene, double end_s) {
     const bool grasping =
         scene.tools[key.tool].kind == ToolKind::kGrasper && key.jaw_rad < scene.physics.grasp_close_rad;
     demands.deformation |= (heating || grasping) && left >= kTimeToDeform;
-    // Coag opens nothing.
-    demands.cut |= heating && (key.pedals & (kPedalCut | kPedalBlend)) != 0 && left >= kTimeToCut;
+    demands.grasp |= grasping && left >= kTimeToDeform;
+    // Coag opens nothing, and only sheets are cut.
+    demands.cut |= heating && scene.membrane.node_count() > 0 && (key.pedals & (kPedalCut | kPedalBlend)) != 0 &&
+                   left >= kTimeToCut;
   }
   return demands;
 }

@@ -16,7 +16,8 @@ namespace fulcrum::supervisor {
 /// Effects that a run up to some session time must show.
 struct ScriptDemands {
   bool deformation = false;  ///< The script grasps, or works with the hook.
-  bool cut = false;          ///< The script holds the pedal down with power.
+  bool cut = false;          ///< The script holds the pedal down with power, and there is a sheet to cut.
+  bool grasp = false;        ///< The script grasps.
 };
 /// Demands of the script up to session time `end_s` [s], without actions so shortly before it that the tissue cannot
 /// have followed.

@@ -124,7 +124,7 @@ bool PassesGate(const CauteryContact& m) noexcept {
       std::all_of(b.begin(), b.end(), [](float w) { return Within(w, -kUnitTolerance, 1.0f + kUnitTolerance); });
   const bool place_is_known = m.triangle != kNoIndex && Magnitude(b[0] + b[1] + b[2] - 1.0f, kUnitTolerance);
   return IsStamp(m.stamp) && IsSessionTime(m.session_time_s) && m.tool < kMaxTools && weights_in_range &&
-         (!(m.touching || m.on_solid) || place_is_known) && !(m.touching && m.on_solid) &&
+         (!(m.touching || m.on_solid) || place_is_known) && !(m.on_solid && (m.touching || m.tented)) &&
          Magnitude(m.material, kMaxCoordinate_m) && Magnitude(m.material_rate, kMaxSpeed_m_s) &&
          Within(m.contact_radius_m, 0.0, kMaxCoordinate_m) && m.footprint.whole();
 }

@@ -8,6 +8,7 @@
 #include "services/scene/builder/build.h"
 #include "services/transport/bus/gate.h"
 #include "tests/numerics/thermal/flat_scene.h"
+#include "thermal_node/coupling/solid_surface.h"
 #include "thermal_node/coupling/thermal_solver.h"
 
 namespace fulcrum::testing {
@@ -100,11 +101,57 @@ class ThermalCheck final : public CheckpointCheck {
   }();
 };
 
+class SolidCheck final : public CheckpointCheck {
+ public:
+  SolidCheck() {
+    scene_.rest_position = vertices_;
+    scene_.tube_surface = triangles_;
+    const SolidChart chart = MakeSolidCharts(scene_).charts.at(0);
+    tip_.active = tip_.touching = true;
+    tip_.path.from = tip_.path.to = chart.Material({0.006f, 0.006f, 0});
+    tip_.path.radius_m = 5e-4f;
+    tip_.mode = CauteryMode::kBlend;
+    tip_.power_W = 35;
+    thermal::SolidSurface worker(scene_);
+    thermal::Interface hook;
+    for (int step = 0; step < 40; ++step) (void)worker.Step(std::span(&tip_, 1), kDt, &hook);
+    good_.resize(thermal::SolidSurface::CheckpointCapacity());
+    good_.resize(worker.Save(good_));
+  }
+  Outcome Offer(std::span<const std::byte> payload, int steps) override {
+    thermal::SolidSurface solids(scene_);
+    if (!solids.Restore(payload)) {
+      const bool fresh = solids.TickHash() == 0 && solids.field().Existing().empty();
+      return fresh ? Outcome::kRefused : Outcome::kBroken;
+    }
+    thermal::Interface hook;
+    for (int step = 0; step < steps; ++step) {
+      (void)solids.Step(std::span(&tip_, 1), kDt, &hook);
+      const double numbers[] = {
+          solids.ledger().joule, solids.ledger().generator, solids.ledger().Out(), solids.highest_C(),
+          solids.power_W(),      solids.voltage_V(),        solids.dead_m2(),      hook.hook_theta};
+      if (!std::all_of(std::begin(numbers), std::end(numbers), [](double x) { return std::isfinite(x); })) {
+        return Outcome::kBroken;
+      }
+    }
+    return Outcome::kTaken;
+  }
+
+ private:
+  static constexpr float kDt = 0.01f;
+  const std::vector<Vec3f> vertices_{{0, 0, 0}, {0.012f, 0, 0}, {0.012f, 0.012f, 0}, {0, 0.012f, 0}};
+  const std::vector<Triangle> triangles_{{0, 1, 2}, {0, 2, 3}};
+  TissueScene scene_;
+  thermal::TipInput tip_;
+};
+
 }  // namespace
 
 std::unique_ptr<CheckpointCheck> MakePhysicsCheck(const scene::SceneSettings& scene) {
   return std::make_unique<PhysicsCheck>(scene);
 }
 std::unique_ptr<CheckpointCheck> MakeThermalCheck(float cell_m) { return std::make_unique<ThermalCheck>(cell_m); }
+
+std::unique_ptr<CheckpointCheck> MakeSolidCheck() { return std::make_unique<SolidCheck>(); }
 
 }  // namespace fulcrum::testing

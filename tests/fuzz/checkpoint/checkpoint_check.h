@@ -32,5 +32,7 @@ class CheckpointCheck {
 [[nodiscard]] std::unique_ptr<CheckpointCheck> MakePhysicsCheck(const scene::SceneSettings& scene = scene::Small());
 /// A hook has cut a sheet above tissue that is warm in depth.
 [[nodiscard]] std::unique_ptr<CheckpointCheck> MakeThermalCheck(float cell_m = 1e-4f);
+/// A hook has burnt the surface of a solid.
+[[nodiscard]] std::unique_ptr<CheckpointCheck> MakeSolidCheck();
 
 }  // namespace fulcrum::testing

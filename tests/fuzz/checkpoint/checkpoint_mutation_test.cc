@@ -54,7 +54,7 @@ std::vector<std::byte> Mutate(std::vector<std::byte> payload, std::mt19937* rand
   return payload;
 }
 
-void Hold(CheckpointCheck* check, const std::string& corpus) {
+void HoldMutants(CheckpointCheck* check) {
   ASSERT_EQ(check->Offer(check->good()), Outcome::kTaken);
   std::mt19937 random(3);
   std::array<int, 3> outcomes{};
@@ -66,7 +66,10 @@ void Hold(CheckpointCheck* check, const std::string& corpus) {
   // Both outcomes must occur; otherwise the test checks nothing.
   EXPECT_GT(outcomes[0], kInputs / 10);
   EXPECT_GT(outcomes[1], kInputs / 10);
+}
 
+void Hold(CheckpointCheck* check, const std::string& corpus) {
+  HoldMutants(check);
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(corpus)) {
     std::ifstream file(entry.path(), std::ios::binary);
@@ -84,6 +87,8 @@ constexpr const char* kCorpus = FULCRUM_SOURCE_DIR "/tests/fuzz/corpus/checkpoin
 TEST(CheckpointMutation, PhysicsRefusesOrGoesOn) {
   Hold(testing::MakePhysicsCheck().get(), std::string(kCorpus) + "physics");
 }
+
+TEST(CheckpointMutation, SolidsRefuseOrGoOn) { HoldMutants(testing::MakeSolidCheck().get()); }
 
 TEST(CheckpointMutation, ThermalRefusesOrGoesOn) {
   Hold(testing::MakeThermalCheck().get(), std::string(kCorpus) + "thermal");

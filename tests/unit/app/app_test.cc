@@ -120,7 +120,7 @@ TEST(HealthReportTest, FitsToTheMessage) {
   health.last_error = std::string(1000, 'e');
   FitToMessage(&health);
   EXPECT_EQ(health.inputs.size(), 16u);
-  EXPECT_EQ(health.metrics.size(), 24u);
+  EXPECT_EQ(health.metrics.size(), 28u);
   EXPECT_EQ(health.metrics[0].name.size(), 31u);
   EXPECT_EQ(health.metrics[0].value, 0);
   EXPECT_EQ(health.last_error.size(), 255u);

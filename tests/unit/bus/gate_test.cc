@@ -147,6 +147,11 @@ TEST(GateRanges, CauteryContact) {
        {"a footprint without gaps", [](auto& m) { m.footprint.gap.clear(); }},
        {"a footprint beyond all sheets", [](auto& m) { m.footprint.x = -200'000'000; }},
        {"touching nothing", [](auto& m) { m.triangle = kNoIndex; }},
+       {"a solid that is lifted off",
+        [](auto& m) {
+          m.touching = false;
+          m.on_solid = m.tented = true;
+        }},
        {"on two surfaces", [](auto& m) { m.on_solid = true; }},
        {"on no triangle of a solid", [](auto& m) {
           m.touching = false;
@@ -243,7 +248,7 @@ TEST(GateRanges, Health) {
                          {"negative time", [](auto& m) { m.step.p99_us = -1; }},
                          {"unknown topic", [](auto& m) { m.inputs[0].topic = BeyondLast<TopicId>(); }},
                          {"too many inputs", [](auto& m) { m.inputs.resize(17); }},
-                         {"too many metrics", [](auto& m) { m.metrics.resize(25); }},
+                         {"too many metrics", [](auto& m) { m.metrics.resize(kMaxMetrics + 1); }},
                          {"metric's name too long", [](auto& m) { m.metrics[0].name = std::string(32, 'x'); }}});
 }
 

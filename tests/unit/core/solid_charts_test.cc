@@ -1,4 +1,4 @@
-// Charts of the solids' surface: every triangle in one, lengths kept, no two over the same cells.
+// Charts of the solids' surface: every triangle is in one, lengths are kept, and no cell belongs to two places.
 #include "services/base/core/solid_charts.h"
 
 #include <gtest/gtest.h>
@@ -129,12 +129,37 @@ TEST(SolidCharts, KeepLengthsOfAPlate) {
   }
 }
 
-TEST(SolidCharts, AreTheSameEachTime) {
-  const Surface surface = Sphere(0.05f, 30, 60);
-  const SolidCharts a = MakeSolidCharts(surface.View()), b = MakeSolidCharts(surface.View());
-  EXPECT_EQ(a.of_triangle, b.of_triangle);
-  ASSERT_EQ(a.charts.size(), b.charts.size());
-  for (std::size_t k = 0; k < a.charts.size(); ++k) EXPECT_EQ(a.charts[k].shift, b.charts[k].shift);
+/// A ramp that winds about the z axis and comes to lie over its own beginning.
+TEST(SolidCharts, DoNotOverlapThemselves) {
+  Surface ramp;
+  constexpr Index kSteps = 160;
+  for (Index k = 0; k <= kSteps; ++k) {
+    const float turn = 2 * std::numbers::pi_v<float> * 1.6f * static_cast<float>(k) / kSteps;
+    for (const float radius : {0.004f, 0.012f}) {
+      ramp.vertices.push_back({radius * std::cos(turn), radius * std::sin(turn), 0.008f / 6.2832f * turn});
+    }
+  }
+  for (Index k = 0; k < kSteps; ++k) {
+    ramp.triangles.push_back({2 * k, 2 * k + 1, 2 * k + 3});
+    ramp.triangles.push_back({2 * k, 2 * k + 3, 2 * k + 2});
+  }
+  const SolidCharts charts = MakeSolidCharts(ramp.View());
+  EXPECT_GE(charts.charts.size(), 2u);
+  std::map<std::pair<int, int>, int> covered;
+  for (Index t = 0; t < ramp.triangles.size(); ++t) {
+    const auto p = MaterialOf(ramp, charts, t);
+    const Vec2f e1 = p[1] - p[0], e2 = p[2] - p[0];
+    const float area = e1.x() * e2.y() - e1.y() * e2.x();
+    for (int y = 0; y < charts.height; ++y) {
+      for (int x = 0; x < charts.width; ++x) {
+        const Vec2f d = kSolidCell_m * Vec2f(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) - p[0];
+        const float u = (d.x() * e2.y() - d.y() * e2.x()) / area, v = (e1.x() * d.y() - e1.y() * d.x()) / area;
+        if (u > 0.05f && v > 0.05f && u + v < 0.95f) ++covered[{x, y}];
+      }
+    }
+  }
+  const auto twice = std::count_if(covered.begin(), covered.end(), [](const auto& cell) { return cell.second > 1; });
+  EXPECT_LT(static_cast<double>(twice), 0.005 * static_cast<double>(covered.size()));
 }
 
 TEST(SolidCharts, LeaveOutWhatTheAtlasCannotHold) {

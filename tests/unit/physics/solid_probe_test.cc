@@ -1,4 +1,4 @@
-// The hook on the surface of a solid: footprint in its chart, continuous under slide, after the membrane.
+// The hook on the surface of a solid: footprint in its chart, continuous while it slides; the charts of a scene.
 #include "physics_node/contact_model/solid_probe.h"
 
 #include <gtest/gtest.h>
@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "physics_node/simulation/tissue_simulation.h"
+#include "services/base/core/hash.h"
 #include "services/transport/bus/gate.h"
 #include "tests/support/several_solids.h"
 
@@ -89,6 +90,18 @@ TEST_F(OnPad, TheContactEndsWhenTheToolIsLifted) {
   for (int i = 0; i <= 50; ++i) contact = To(at + Vec3f(0, 0, 1e-4f * static_cast<float>(i)));
   EXPECT_FALSE(contact.on_solid);
   EXPECT_EQ(contact.footprint.width, 0u);
+}
+
+/// Recordings, checkpoints and the processes of a cart must agree on the charts.
+TEST_F(OnPad, TheChartsOfASceneStayAsTheyAre) {
+  Hash64 hash;
+  for (const SolidChart& chart : charts_.charts) {
+    hash.AddValue(chart.x);
+    hash.AddValue(chart.y);
+    hash.AddValue(chart.solid);
+  }
+  hash.Add(std::span<const Index>(charts_.of_triangle));
+  EXPECT_EQ(hash.value(), 2463002637463998298u) << "changed charts: a breaking change, see CHANGELOG";
 }
 
 TEST(SolidsBurn, NeedSolidsAHookAndTheAccurateModelOfHeat) {

@@ -102,7 +102,13 @@ TEST(SessionRecordTest, ABurntOrganIsAnEffectAndAFigureOfItsName) {
     event.value = m2;
     record.AddEvent(event);
   }
-  EXPECT_EQ(MissingFrom(record, {.deformation = true, .cut = true}), "");
+  EXPECT_EQ(MissingFrom(record, {.cut = true}), "");
+  EXPECT_EQ(MissingFrom(record, {.deformation = true}), "");
+  EXPECT_NE(MissingFrom(record, {.deformation = true, .grasp = true}), "");
+  SessionRecord both = record;
+  event.kind = ThermalEventKind::kContact;
+  both.AddEvent(event);
+  EXPECT_NE(MissingFrom(both, {.cut = true}), "") << "the hook had current in the membrane as well";
   SessionOutcome outcome;
   outcome.solids = {"organ", "cystic duct"};
   const std::vector<KeyFigure> figures = KeyFigures(outcome, record);
@@ -110,7 +116,7 @@ TEST(SessionRecordTest, ABurntOrganIsAnEffectAndAFigureOfItsName) {
   EXPECT_EQ(figures[0].key, "burnt.cystic_duct_mm2");
   EXPECT_EQ(figures[0].label, "burnt surface of cystic duct");
   EXPECT_NEAR(figures[0].value, 12.5, 1e-4);
-  EXPECT_EQ(figures[1].key, "burnt.organ_mm2");  // Of no solid that the scene names.
+  EXPECT_EQ(figures[1].key, "burnt.solid_7_mm2");  // Of no solid that the scene names.
 }
 
 // ------------------------------------------------------------------------------------------------ script outlook
@@ -121,6 +127,7 @@ class ScriptTest : public ::testing::Test {
     scene_.tools[0].kind = ToolKind::kGrasper;
     scene_.tools[1].kind = ToolKind::kHook;
     scene_.script = keys_;
+    scene_.membrane.rows = scene_.membrane.cols = 2;
   }
   static constexpr float kOpen = 0.8f, kClosed = 0.0f;
   const std::vector<ScriptKey> keys_{
@@ -147,6 +154,10 @@ TEST_F(ScriptTest, DemandsGrowWithTheTimeGiven) {
   EXPECT_TRUE(DemandsUntil(scene_, 6.0).deformation);
   EXPECT_FALSE(DemandsUntil(scene_, 9.0).cut);
   EXPECT_TRUE(DemandsUntil(scene_, 20.0).cut);
+  EXPECT_TRUE(DemandsUntil(scene_, 20.0).grasp);
+  SceneView without_sheet = scene_;
+  without_sheet.membrane = {};
+  EXPECT_FALSE(DemandsUntil(without_sheet, 20.0).cut);
   EXPECT_FALSE(DemandsUntil(SceneView{}, 20.0).deformation);
   std::vector<ScriptKey> coag(scene_.script.begin(), scene_.script.end());
   for (ScriptKey& key : coag) key.pedals = key.pedals == kPedalNone ? kPedalNone : kPedalCoag;

@@ -7,7 +7,7 @@ const timeline = (() => {
   const kKinds = {
     ureter_injury: ['✖', 'Ureter!', 'level-bad'], nerve_injury: ['✖', 'Nerve!', 'level-bad'],
     ureter_warning: ['▲', 'Ureter', 'level-busy'], nerve_warning: ['▲', 'Nerve', 'level-busy'],
-    organ_burn: ['▲', 'Organ', 'level-busy'],
+    organ_burnt: ['▲', 'Organ', 'level-busy'],
     force: ['▲', 'Force', 'level-busy'], slip: ['△', 'Slip', 'level-busy'],
     pedal_cut: ['■', 'Pedal cut', 'cut-mark'], pedal_coag: ['■', 'Pedal coag', 'coag-mark'], pedal_blend: ['■', 'Pedal blend', 'cut-mark'],
     grasp: ['▼', 'Grasp', 'hand-mark'], release: ['▽', 'Release', 'hand-mark'], touch: ['◇', 'Touch', 'hand-mark'],

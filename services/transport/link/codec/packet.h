@@ -13,7 +13,7 @@
 namespace fulcrum::link {
 
 /// Increases with any change of the packets below and of the codecs.
-inline constexpr std::uint8_t kWireVersion = 2;
+inline constexpr std::uint8_t kWireVersion = 3;
 
 enum class PacketKind : std::uint8_t {
   kPulse,       ///< Both ways, 20 Hz: clock stamps, wanted topics, missing chunks.
