@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <map>
 
 #include "services/apps/replayer/coupled_nodes.h"
 #include "services/apps/replayer/session_facts.h"
@@ -99,8 +100,16 @@ class Comparison {
     for (const ThermalEvent& event : outcome.events) {
       const bool injury = event.kind == ThermalEventKind::kUreterInjury || event.kind == ThermalEventKind::kNerveInjury;
       result.injuries.*side += injury ? 1 : 0;
+      if (event.kind != ThermalEventKind::kSolidBurn) continue;
+      // Each event has the whole area of its solid.
+      double& of_solid = burnt_mm2_[event.solid].*side;
+      const double grown = std::max(0.0, 1e6 * static_cast<double>(event.value) - of_solid);
+      of_solid += grown;
+      result.burnt_mm2.*side += grown;
     }
   }
+
+  std::map<std::uint8_t, Pair> burnt_mm2_;  ///< By solid.
 
   Spread position_, tissue_, hand_;
 };

@@ -34,7 +34,8 @@ struct WhatIfResult {
   double rms_hand_force_N = 0;
   Pair cut_length_mm;  ///< Only when thermal is replayed.
   Pair highest_temperature_C;
-  Pair injuries;  ///< Number of injuries of ureter and nerve.
+  Pair injuries;   ///< Number of injuries of ureter and nerve.
+  Pair burnt_mm2;  ///< Dead surface of all organs.
 };
 
 /// Replays the nodes twice, side by side: with `before` and with `after`. Nodes that are replayed together receive each

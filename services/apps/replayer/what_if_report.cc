@@ -28,6 +28,7 @@ std::string ReportText(const WhatIfResult& result, const std::vector<NodeId>& no
     text += PairLine("cut length [mm]", result.cut_length_mm);
     text += PairLine("highest temperature [C]", result.highest_temperature_C);
     text += PairLine("injuries", result.injuries);
+    text += PairLine("burnt surface of organs [mm2]", result.burnt_mm2);
   }
   if (has(NodeId::kPhysics)) {
     text += Format("positions apart: rms %.4g mm, at most %.4g mm (at %.2f s)\n", result.rms_position_mm,
@@ -64,6 +65,7 @@ void WriteReportJson(const WhatIfResult& result, const std::filesystem::path& fi
   add_pair("cut_length_mm", result.cut_length_mm);
   add_pair("highest_temperature_C", result.highest_temperature_C);
   add_pair("injuries", result.injuries);
+  add_pair("burnt_mm2", result.burnt_mm2);
   WriteText(file, json + "\n}\n");
 }
 

@@ -82,16 +82,11 @@ std::string RaiseFileLimit(unsigned needed) {
          "ulimit -Hn of the shell that lowered it";
 }
 
-namespace {
-
-/// A library whose thread or memory was refused may report an error of another name.
 std::string AddressSpaceHint() {
   rlimit limit{};
   if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return {};
   return "; its address space is limited to " + std::to_string(limit.rlim_cur >> 20) + " MiB (ulimit -v)";
 }
-
-}  // namespace
 
 void InstallLastWords() {
   std::set_terminate([] {

@@ -17,6 +17,10 @@ namespace fulcrum::runtime {
 /// `needed` are permitted.
 [[nodiscard]] std::string RaiseFileLimit(unsigned needed);
 
+/// The end of a message of an error that a limit of the address space may have caused: a library whose thread or memory
+/// was refused may report it by another name. Empty: there is no limit.
+[[nodiscard]] std::string AddressSpaceHint();
+
 /// Makes an exception that no thread catches end the process with one line in its log, then abort.
 void InstallLastWords();
 

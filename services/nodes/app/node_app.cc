@@ -13,6 +13,7 @@
 #include <new>
 #include <optional>
 #include <stdexcept>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -383,7 +384,9 @@ int NodeMain(int argc, char** argv, NodeId node, const char* description,
   } catch (const MismatchError& error) {
     return fail(ExitCode::kMismatch, error);
   } catch (const std::bad_alloc&) {
-    return fail(ExitCode::kFailure, std::runtime_error("out of memory"));
+    return fail(ExitCode::kFailure, std::runtime_error("out of memory" + runtime::AddressSpaceHint()));
+  } catch (const std::system_error& error) {
+    return fail(ExitCode::kFailure, std::runtime_error(error.what() + runtime::AddressSpaceHint()));
   } catch (const std::exception& error) {
     return fail(ExitCode::kFailure, error);
   }

@@ -56,8 +56,10 @@ TEST(SheetTest, CellsOutsideTheMembraneAreNoTissue) {
   EXPECT_FALSE(sheet.OnSheet({1e9f, 0.001f}));
 }
 
-TEST(SheetTest, SceneWithoutMembraneIsRefused) {
+TEST(SheetTest, ASceneWithoutMembraneHasNoCellsAndABadOneIsRefused) {
   scene::SceneData data;
+  EXPECT_EQ(MakeSheet(data.View()).tile_count(), 0);
+  data.fixed.membrane.rows = data.fixed.membrane.cols = 5;  // Without nodes.
   EXPECT_THROW((void)MakeSheet(data.View()), InputError);
   data = FlatScene(5, 5, 1e-3f);
   data.membrane_material[3].x() = NAN;
