@@ -15,6 +15,7 @@ namespace {
 constexpr float kLeastCosine = 0.643f;  ///< Of the angle between a triangle's normal and its chart's: 50 degrees.
 constexpr float kMostExtent_m = 0.04f;  ///< Of a chart along either axis.
 constexpr std::int32_t kBetween = 2;    ///< Texels around a chart.
+constexpr float kCover_m = 8e-4f;       ///< Cell in which a chart is kept from lying over itself; finer takes longer.
 
 /// By triangle and side (corners k, k + 1): the triangle beyond; kNoIndex at a border.
 std::vector<std::array<Index, 3>> Neighbours(std::span<const Triangle> triangles) {
@@ -68,12 +69,12 @@ class Cutter {
     result.of_triangle.assign(triangles_.size(), kNoIndex);
     for (Index seed = 0; seed < triangles_.size(); ++seed) {
       if (result.of_triangle[seed] != kNoIndex) continue;
-      std::vector<Index> part = Grow(seed, normals_[seed], result.of_triangle).second;
+      std::vector<Index> part = Grow(seed, normals_[seed], result.of_triangle, false).second;
       Vec3f mean = Vec3f::Zero();
       for (const Index t : part) mean += areas_[t];
       // The seed itself must be part of its chart.
       if (normals_[seed].dot(mean.stableNormalized()) < kLeastCosine) mean = areas_[seed];
-      auto [chart, own] = Grow(seed, mean.stableNormalized(), result.of_triangle);
+      auto [chart, own] = Grow(seed, mean.stableNormalized(), result.of_triangle, true);
       for (const Index t : own) result.of_triangle[t] = static_cast<Index>(result.charts.size());
       const Index vertex = triangles_[seed][0];
       chart.solid = vertex < solid_of_.size() ? solid_of_[vertex] : 0;
@@ -85,7 +86,8 @@ class Cutter {
  private:
   [[nodiscard]] const Vec3f& At(Index vertex) const { return scene_.rest_position[vertex]; }
 
-  std::pair<SolidChart, std::vector<Index>> Grow(Index seed, const Vec3f& normal, const std::vector<Index>& taken) {
+  std::pair<SolidChart, std::vector<Index>> Grow(Index seed, const Vec3f& normal, const std::vector<Index>& taken,
+                                                 bool once) {
     SolidChart chart;
     const Vec3f n = normal.isZero() ? Vec3f(Vec3f::UnitZ()) : normal;
     chart.s_axis = n.unitOrthogonal();
@@ -94,14 +96,14 @@ class Cutter {
     std::vector<Index> part{seed};
     seen_[seed] = stamp_;
     const Vec2f middle = Projected(chart, triangles_[seed][0]);
-    (void)Cover(chart, middle, seed);
+    if (once) (void)Cover(chart, middle, seed);
     Box box = With(Box{}, chart, seed);
     for (std::size_t next = 0; next < part.size(); ++next) {
       for (const Index t : beyond_[part[next]]) {
         if (t == kNoIndex || seen_[t] == stamp_ || taken[t] != kNoIndex || normals_[t].dot(n) < kLeastCosine) continue;
         seen_[t] = stamp_;
         const Box larger = With(box, chart, t);
-        if (larger.extent().maxCoeff() > kMostExtent_m || !Cover(chart, middle, t)) continue;
+        if (larger.extent().maxCoeff() > kMostExtent_m || (once && !Cover(chart, middle, t))) continue;
         box = larger;
         part.push_back(t);
       }
@@ -119,13 +121,13 @@ class Cutter {
     for (const Index v : triangles_[triangle]) box = box.With(Projected(chart, v));
     return box;
   }
-  /// Takes the cells of a triangle, those with their middle well inside. Returns false, and takes none, if one is
-  /// taken: there the surface lies over another part of its chart.
+  /// Takes the cells (of kCover_m) of a triangle, those with their middle well inside. Returns false, and takes none,
+  /// if one is taken: there the surface lies over another part of its chart.
   bool Cover(const SolidChart& chart, const Vec2f& middle, Index triangle) {
     std::array<Vec2f, 3> p;
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec2f from_middle = Projected(chart, triangles_[triangle][k]) - middle;
-      p[k] = from_middle / kSolidCell_m + Vec2f::Constant(0.5f * kCoverCells);
+      p[k] = from_middle / kCover_m + Vec2f::Constant(0.5f * kCoverCells);
     }
     const Vec2f low = p[0].cwiseMin(p[1]).cwiseMin(p[2]), high = p[0].cwiseMax(p[1]).cwiseMax(p[2]);
     const Vec2f e1 = p[1] - p[0], e2 = p[2] - p[0];
@@ -148,7 +150,7 @@ class Cutter {
   }
 
   /// Edge of the square of cells around a seed that its chart can reach.
-  static constexpr int kCoverCells = 2 * static_cast<int>(kMostExtent_m / kSolidCell_m) + 4;
+  static constexpr int kCoverCells = 2 * static_cast<int>(kMostExtent_m / kCover_m) + 4;
 
   const TissueScene& scene_;
   std::span<const Triangle> triangles_;

@@ -33,8 +33,9 @@ struct SolidCharts {
 };
 
 /// Charts of at most 40 mm (or one triangle), whose triangles lean by at most 50 degrees, so that lengths on them are
-/// up to 1.6 times those in the chart, and cover no cell twice. Between two charts there are cells that belong to none.
-/// Processes, recordings and checkpoints of a scene must agree on the charts: a test holds them to a hash.
+/// up to 1.6 times those in the chart, and do not lie over themselves but for slivers. Between two charts there are
+/// cells that belong to none. Processes, recordings and checkpoints of a scene must agree on the charts: a test holds
+/// them to a hash.
 [[nodiscard]] SolidCharts MakeSolidCharts(const TissueScene& scene);
 
 /// Whether this scene's solids are burnt: it has some, a hook, and not the paper's model of heat.
