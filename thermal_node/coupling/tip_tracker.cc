@@ -8,7 +8,7 @@ namespace fulcrum::thermal {
 
 bool TipTracker::Accepts(const CauteryContact& sample) const {
   if (!std::isfinite(sample.session_time_s)) return false;
-  if (!sample.touching) return true;
+  if (!Touches(sample)) return true;
   const bool numbers =
       sample.material.allFinite() && std::isfinite(sample.contact_radius_m) && sample.contact_radius_m >= 0;
   return numbers && sheet_.OnSheet(sample.material) && sample.footprint.whole();
@@ -23,7 +23,7 @@ TipInput TipTracker::Advance(const CauteryContact& sample, const GeneratorDemand
   input.duration_s = static_cast<float>(!follows ? dt_s : energised_ ? since_s : std::min(since_s, dt_s));
   on_path_ = on_path_ && follows;
   last_s_ = sample.session_time_s;
-  if (!sample.touching) {
+  if (!Touches(sample)) {
     on_path_ = energised_ = false;
     return input;
   }

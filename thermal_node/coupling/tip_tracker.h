@@ -28,7 +28,9 @@ inline constexpr std::size_t kMostSamples = 8;
 
 class TipTracker {
  public:
-  TipTracker(const Sheet& sheet, float default_radius_m) : sheet_(sheet), default_radius_m_(default_radius_m) {}
+  /// @param surface the one whose contacts count; a sample on the other is one without contact.
+  TipTracker(const Sheet& sheet, float default_radius_m, BurntSurface surface = BurntSurface::kMembrane)
+      : sheet_(sheet), default_radius_m_(default_radius_m), surface_(surface) {}
 
   /// Converts the next sample. Its path starts at the end of the last one and lasts for the session time between the
   /// two, so the heat does not depend on when samples arrive.
@@ -59,8 +61,13 @@ class TipTracker {
   [[nodiscard]] bool Restore(const State& state);
 
  private:
+  [[nodiscard]] bool Touches(const CauteryContact& sample) const {
+    return surface_ == BurntSurface::kSolids ? sample.on_solid : sample.touching;
+  }
+
   const Sheet& sheet_;
   float default_radius_m_;
+  BurntSurface surface_;
   double last_s_ = -1;  ///< Session time of the last sample; negative: none.
   Footprint print_;
   bool on_path_ = false;

@@ -25,18 +25,6 @@ struct NodeState {
   std::uint32_t unused;
 };
 
-/// A sample as the solids see it.
-CauteryContact OfSolids(const CauteryContact& sample) {
-  if (!sample.on_solid) {
-    CauteryContact none;
-    none.session_time_s = sample.session_time_s;
-    return none;
-  }
-  CauteryContact contact = sample;
-  contact.touching = true;
-  return contact;
-}
-
 }  // namespace
 
 ThermalNode::ThermalNode(const SceneView& scene, const Ports& ports, runtime::CheckpointFile* checkpoint,
@@ -54,7 +42,7 @@ ThermalNode::ThermalNode(const SceneView& scene, const Ports& ports, runtime::Ch
       manifest_stamper_(epoch_ns) {
   if (SolidsBurn(scene_)) {
     solids_ = std::make_unique<SolidSurface>(scene_);
-    solid_tracker_.emplace(solids_->field().sheet(), scene_.thermal.hook_radius_m);
+    solid_tracker_.emplace(solids_->field().sheet(), scene_.thermal.hook_radius_m, BurntSurface::kSolids);
     solid_planner_.emplace(solids_->field(), kSolidCell_m);
   }
   topology_.scene_hash = scene_.hash;
@@ -117,7 +105,7 @@ void ThermalNode::TakeGeneratorInputs(const Tick& tick) {
 bool ThermalNode::Accepts(const CauteryContact& sample) const {
   if (!tracker_.Accepts(sample)) return false;
   if (!sample.on_solid || !solid_tracker_) return true;
-  return solid_tracker_->Accepts(OfSolids(sample)) && solids_->IsOn(sample.triangle, sample.material);
+  return solid_tracker_->Accepts(sample) && solids_->IsOn(sample.triangle, sample.material);
 }
 
 void ThermalNode::TakeContacts(const Tick& tick) {
@@ -154,7 +142,7 @@ TipInput ThermalNode::AdvanceOnSolids(const CauteryContact& sample, const Genera
     if (chart != solid_chart_) solid_tracker_->BreakPath();
     solid_chart_ = chart;
   }
-  return solid_tracker_->Advance(OfSolids(sample), demand, dt_s);
+  return solid_tracker_->Advance(sample, demand, dt_s);
 }
 
 std::size_t ThermalNode::CheckpointCapacity(const SceneView& scene) {
