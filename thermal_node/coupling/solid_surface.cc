@@ -95,8 +95,8 @@ void SolidSurface::AddDead(const Tile& tile, std::array<double, kMaxSolids>* cel
   if (charts.empty()) {
     for (Index i = 0; i < charts_.charts.size(); ++i) {
       const SolidChart& chart = charts_.charts[i];
-      const bool apart = chart.x >= corner.ix + kTile || chart.x + chart.width < corner.ix ||
-                         chart.y >= corner.iy + kTile || chart.y + chart.height < corner.iy;
+      const bool apart = chart.x >= corner.ix + kTile || chart.x + chart.width <= corner.ix ||
+                         chart.y >= corner.iy + kTile || chart.y + chart.height <= corner.iy;
       if (!apart) charts.push_back(i);
     }
   }
@@ -104,11 +104,8 @@ void SolidSurface::AddDead(const Tile& tile, std::array<double, kMaxSolids>* cel
     const bool tissue = (tile.state.flags[k] & (kOutside | kQuarantined)) == 0;
     if (!tissue || (tile.state.omega_cell[k] < 1.0f && (tile.state.flags[k] & kRemoved) == 0)) continue;
     const CellIndex cell{corner.ix + k % kTile, corner.iy + k / kTile};
-    const auto here = std::find_if(charts.begin(), charts.end(), [&](Index i) {
-      const SolidChart& chart = charts_.charts[i];
-      return cell.ix >= chart.x && cell.ix <= chart.x + chart.width && cell.iy >= chart.y &&
-             cell.iy <= chart.y + chart.height;
-    });
+    const auto here = std::find_if(charts.begin(), charts.end(),
+                                   [&](Index i) { return charts_.charts[i].Contains(cell.ix, cell.iy); });
     const Index solid = here != charts.end() ? charts_.charts[*here].solid : 0;
     (*cells)[solid] += static_cast<double>(tile.geometry.area[k]);
     (*where)[solid] = cell;
@@ -131,24 +128,16 @@ void SolidSurface::MeasureBurns() {
   }
 }
 
-namespace {
-
-bool InBox(const SolidChart& chart, const Vec2f& material) {
-  const Vec2f cell = material / kSolidCell_m - Vec2f(static_cast<float>(chart.x), static_cast<float>(chart.y));
-  return cell.x() >= 0 && cell.y() >= 0 && cell.x() <= static_cast<float>(chart.width) &&
-         cell.y() <= static_cast<float>(chart.height);
-}
-
-}  // namespace
-
 bool SolidSurface::IsOn(Index triangle, const Vec2f& material) const {
   const Index chart = ChartOf(triangle);
-  return chart != kNoIndex && InBox(charts_.charts[chart], material);
+  const CellIndex cell = field_.sheet().CellOf(material);
+  return chart != kNoIndex && charts_.charts[chart].Contains(cell.ix, cell.iy);
 }
 
 Index SolidSurface::SolidAt(const Vec2f& material) const {
+  const CellIndex cell = field_.sheet().CellOf(material);
   const auto here = std::find_if(charts_.charts.begin(), charts_.charts.end(),
-                                 [&](const SolidChart& chart) { return InBox(chart, material); });
+                                 [&](const SolidChart& chart) { return chart.Contains(cell.ix, cell.iy); });
   return here != charts_.charts.end() ? here->solid : kNoIndex;
 }
 

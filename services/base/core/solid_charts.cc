@@ -189,7 +189,10 @@ void Pack(SolidCharts* all) {
       tallest = 0;
     }
     left_out[index] = y + height > kAtlasTexels || width > kAtlasTexels ? 1 : 0;
-    if (left_out[index] != 0) continue;
+    if (left_out[index] != 0) {
+      chart.width = chart.height = 0;
+      continue;
+    }
     chart.x = x + kBetween;
     chart.y = y + kBetween;
     chart.shift += kSolidCell_m * Vec2f(static_cast<float>(chart.x), static_cast<float>(chart.y));

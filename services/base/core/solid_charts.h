@@ -16,12 +16,17 @@ inline constexpr float kSolidCell_m = 2e-4f;
 struct SolidChart {
   Vec3f s_axis = Vec3f::UnitX(), t_axis = Vec3f::UnitY();  ///< Orthonormal, in W at rest.
   Vec2f shift = Vec2f::Zero();                             ///< Material coordinates of the origin of W [m].
-  std::int32_t x = 0, y = 0, width = 0, height = 0;        ///< Its box in the atlas [texels].
-  Index solid = 0;                                         ///< Index in TissueScene::solids; 0 in a scene of one organ.
+  /// Its box in the atlas [texels]; empty: the atlas was full.
+  std::int32_t x = 0, y = 0, width = 0, height = 0;
+  Index solid = 0;  ///< Index in TissueScene::solids; 0 in a scene of one organ.
 
   /// (s, t) in the atlas [m] of a point at rest.
   [[nodiscard]] Vec2f Material(const Vec3f& rest) const { return shift + Vec2f(s_axis.dot(rest), t_axis.dot(rest)); }
   [[nodiscard]] Vec3f normal() const { return s_axis.cross(t_axis); }
+  /// Whether a texel lies in its box.
+  [[nodiscard]] bool Contains(std::int32_t tx, std::int32_t ty) const {
+    return tx >= x && ty >= y && tx < x + width && ty < y + height;
+  }
 };
 
 struct SolidCharts {
