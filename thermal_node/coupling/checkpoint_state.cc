@@ -294,6 +294,7 @@ std::size_t SolidSurface::CheckpointCapacity() {
 }
 
 std::size_t SolidSurface::Save(std::span<std::byte> out) const {
+  if (frame_ == 0) return SaveNothing(out);
   Writer writer(out);
   Record record{};
   record.layout = kSolidLayout;
@@ -305,9 +306,8 @@ std::size_t SolidSurface::Save(std::span<std::byte> out) const {
   record.reported_m2 = reported_m2_;
   record.power_W = power_W_;
   record.tile_count = StoredTiles(field_);
-  record.used = frame_ > 0 ? 1 : 0;
+  record.used = 1;
   writer.PutValue(record);
-  if (record.used == 0) return writer.used();
   SourceWindow::State window;
   source_.Export(&window);
   writer.PutValue(window);
