@@ -58,7 +58,8 @@ TEST_F(NodeOverSolid, ABurnGivesAPatchOfItsOwnAtlasAndAnEvent) {
   EXPECT_GT(MetricOf(*node, "solid_burn_mm2"), 1.0);
   EXPECT_GT(MetricOf(*node, "highest_temperature_C"), 90.0);
   EXPECT_EQ(MetricOf(*node, "cut_length_mm"), 0.0);
-  EXPECT_GT(MetricOf(*node, "delivered_J"), 2.0);
+  EXPECT_GT(MetricOf(*node, "delivered_J"), 0.0);
+  EXPECT_EQ(MetricOf(*node, "delivered_J"), node->solids()->ledger().generator);
   EXPECT_LT(MetricOf(*node, "energy_closure"), 1e-3);
   EXPECT_EQ(node->solver().topology().revision(), 0u);
 
@@ -131,7 +132,7 @@ TEST_F(NodeOverSolid, AStrokeGoesOnOverARestartWithoutABridge) {
     const Tile* tile = node->solids()->field().Find(ix / kTile, iy / kTile);
     open += tile != nullptr && (tile->state.flags[(iy % kTile) * kTile + ix % kTile] & kRemoved) != 0 ? 1 : 0;
   }
-  EXPECT_GT(all, 35);
+  EXPECT_GT(all, 40);
   EXPECT_GE(open, all - 1);
 }
 
