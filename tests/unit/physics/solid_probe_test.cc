@@ -75,11 +75,11 @@ TEST_F(OnPad, TheContactMovesAsTheToolDoes) {
   for (int i = 0; i <= 100; ++i) {
     const CauteryContact contact = To(start + Vec3f(4e-5f * static_cast<float>(i), 0, 0));
     ASSERT_TRUE(contact.on_solid) << i;
-    EXPECT_LT((contact.material - last.value_or(contact.material)).norm(), 3e-4f) << i;
+    EXPECT_LT((contact.material - last.value_or(contact.material)).norm(), 8e-5f) << i;
     first = first ? *first : contact.material;
     last = contact.material;
   }
-  EXPECT_NEAR((*last - *first).norm(), 0.004f, 0.0008f);
+  EXPECT_NEAR((*last - *first).norm(), 0.004f, 0.0003f);
 }
 
 TEST_F(OnPad, TheContactEndsWhenTheToolIsLifted) {
