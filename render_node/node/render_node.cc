@@ -46,7 +46,7 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
       view_(stage_->view),
       display_(*stage_->display),
       shape_{0, 0, static_cast<int>(scene.render.width), static_cast<int>(scene.render.height)},
-      writer_(settings.frames),
+      outlet_(settings.frames, ports.pictures),
       quality_(settings.quality, static_cast<int>(scene.render.height), display_.is_gpu()),
       operator_stamper_(runtime::MonotonicNs()),
       picture_stamper_(runtime::MonotonicNs()),
@@ -54,7 +54,6 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
       lens_(scene),
       figures_(scene.render.hud != 0) {
   view_.SetMostScale(quality_.most());
-  if (ports_.pictures != nullptr) stream_ = std::make_unique<PictureStream>(ports_.pictures);
   if (ports_.operator_input == nullptr) return;
   const auto write = [this](const OperatorInput& input) {
     OperatorInput stamped = input;
@@ -75,6 +74,7 @@ std::int64_t RenderNode::PeriodNs(std::int64_t cart_ns) const {
 
 void RenderNode::Step(const Tick& tick) {
   session_time_s_ = tick.session_time_s;
+  outlet_.Collect(false, &display_);
   TakeKeys();
   TakeSize();
   if (hud_.paused) {
@@ -95,9 +95,9 @@ void RenderNode::Step(const Tick& tick) {
   }
   if (view_.HazeHasChanged(session_time_s_)) changed_on_screen_ = changed_in_file_ = true;
   // A new reader receives a picture even if nothing moves.
-  const bool streamed = std::exchange(streams_, stream_ && stream_->has_readers());
+  const bool streamed = std::exchange(streams_, outlet_.has_readers());
   if (streams_ && !streamed) changed_on_screen_ = true;
-  const bool write = writer_.has_folder() && (screenshot_ || (changed_in_file_ && session_time_s_ >= next_png_s_));
+  const bool write = outlet_.has_folder() && (screenshot_ || (changed_in_file_ && session_time_s_ >= next_png_s_));
   screenshot_ = false;
   if (write || ((window_ || streams_) && changed_on_screen_)) {
     Draw(session_time_s_, write);
@@ -130,9 +130,15 @@ void RenderNode::DrawFrom(const RenderParams& camera, Bitmap* picture) {
 }
 
 void RenderNode::Finish() {
-  if (writer_.has_folder() && ready() && changed_in_file_) {
+  if (outlet_.has_folder() && ready() && changed_in_file_) {
     Draw(session_time_s_, true);
   }
+  outlet_.Collect(true, &display_);
+}
+
+void RenderNode::WaitForFiles() {
+  outlet_.Collect(true, &display_);
+  outlet_.WaitForFiles();
 }
 
 void RenderNode::TakeTissue() {
@@ -436,16 +442,19 @@ void RenderNode::Draw(double session_time_s, bool write_png, ReadBack read) {
   view_.SetScale(quality_.scale());
   view_.Update();
   UpdateTexts();
-  if (write_png || streams_ || read == ReadBack::kAlways) {
-    display_.DrawAndRead(&picture_);
-  } else {
+  const PictureOutlet::Use use{write_png, streams_, session_time_s, streams_ ? HeaderNow() : PictureHeader()};
+  if (read == ReadBack::kIfUsed && !write_png && !streams_) {
     display_.Draw();
+  } else if (read == ReadBack::kIfUsed && window_ && display_.is_gpu()) {
+    // The window must not wait until a GPU's picture has come into memory.
+    outlet_.Collect(true, &display_);
+    display_.DrawAndStartRead();
+    outlet_.Expect(use);
+  } else {
+    display_.DrawAndRead(&picture_);
+    outlet_.Give(picture_, use);
   }
-  if (streams_) stream_->Add(picture_, HeaderNow());
   if (write_png) {
-    if (!writer_.Add(picture_, session_time_s)) {
-      pictures_dropped_.fetch_add(1, std::memory_order_relaxed);
-    }
     const double period = 1.0 / std::max(0.001f, scene_.render.png_rate_Hz);
     next_png_s_ = period * (std::floor(session_time_s / period) + 1);
     changed_in_file_ = moving;
@@ -479,20 +488,11 @@ void RenderNode::Report(const std::string& error) {
 
 void RenderNode::FillHealth(Health* health) const {
   health->metrics.push_back({"frames_drawn", static_cast<double>(frames_drawn_.load(std::memory_order_relaxed))});
-  health->metrics.push_back({"png_written", static_cast<double>(writer_.written())});
-  health->metrics.push_back({"png_failed", static_cast<double>(writer_.failed())});
-  health->metrics.push_back({"png_dropped", static_cast<double>(pictures_dropped_.load(std::memory_order_relaxed))});
   health->metrics.push_back({"draw_ms", draw_ms_.load(std::memory_order_relaxed)});
   runtime::AddQuantiles("motion_to_picture", motion_to_picture_.snapshot(), health);
   health->metrics.push_back({"scale", scale_.load(std::memory_order_relaxed)});
   health->metrics.push_back({"patches", static_cast<double>(patches_applied_.load(std::memory_order_relaxed))});
-  std::string error = writer_.last_error();
-  if (stream_) {
-    health->metrics.push_back({"pictures_sent", static_cast<double>(stream_->sent())});
-    health->metrics.push_back({"pictures_late", static_cast<double>(stream_->dropped())});
-    health->metrics.push_back({"jpeg_ms", stream_->encode_ms()});
-    if (error.empty()) error = stream_->last_error();
-  }
+  const std::string error = outlet_.FillHealth(health);
   const std::lock_guard lock(error_mutex_);
   health->last_error = error_.empty() ? error : error_;
 }

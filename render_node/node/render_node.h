@@ -16,9 +16,8 @@
 #include "render_node/geometry/camera_control.h"
 #include "render_node/geometry/quality.h"
 #include "render_node/node/hud.h"
-#include "render_node/node/picture_stream.h"
+#include "render_node/node/picture_outlet.h"
 #include "render_node/node/stage.h"
-#include "render_node/offscreen/png_writer.h"
 #include "services/base/core/lens.h"
 #include "services/base/core/pace.h"
 #include "services/base/core/tick.h"
@@ -92,9 +91,9 @@ class RenderNode {
   void Finish();
   /// Waits until the pictures drawn so far are written; for tests, a live node never waits for the disk. Call from the
   /// thread of Step.
-  void WaitForFiles() { writer_.Wait(); }
+  void WaitForFiles();
   [[nodiscard]] std::uint64_t pictures_drawn() const { return frames_drawn_.load(std::memory_order_relaxed); }
-  [[nodiscard]] std::uint64_t pictures_written() const { return writer_.written(); }
+  [[nodiscard]] std::uint64_t pictures_written() const { return outlet_.files_written(); }
 
   /// Fills metrics and last error. May be called from any thread.
   void FillHealth(Health* health) const;
@@ -127,8 +126,8 @@ class RenderNode {
   void FindLate();
   [[nodiscard]] bool Recent(double time_s) const;
   void UpdateTexts();
-  enum class ReadBack { kIfStreamed, kAlways };
-  void Draw(double session_time_s, bool write_png, ReadBack read = ReadBack::kIfStreamed);
+  enum class ReadBack { kIfUsed, kAlways };
+  void Draw(double session_time_s, bool write_png, ReadBack read = ReadBack::kIfUsed);
   void NoteLatency(double draw_ms);
   /// Highest temperature of what was hot lately; none if nothing was.
   [[nodiscard]] std::optional<float> HottestRecent() const {
@@ -152,12 +151,11 @@ class RenderNode {
   LaparoscopeView& view_;
   Display& display_;
   PixelBox shape_;  ///< Of the picture.
-  FrameWriter writer_;
+  PictureOutlet outlet_;
   QualityControl quality_;
   bus::Stamper operator_stamper_;  ///< Of the thread of hands_.
   std::unique_ptr<WindowInput> hands_;
   bus::Stamper picture_stamper_;
-  std::unique_ptr<PictureStream> stream_;
   bool streams_ = false;  // The topic Picture has a reader.
 
   TissueFrame tissue_, new_tissue_;
@@ -202,7 +200,6 @@ class RenderNode {
 
   // Read by the health thread; the values are independent, so relaxed order is enough.
   std::atomic<std::uint64_t> frames_drawn_{0};
-  std::atomic<std::uint64_t> pictures_dropped_{0};
   std::atomic<std::uint64_t> patches_applied_{0};
   std::atomic<double> draw_ms_{0};
   runtime::Histogram motion_to_picture_;

@@ -30,8 +30,10 @@ Framebuffer::~Framebuffer() {
   glDeleteRenderbuffers(1, &depth_);
 }
 
+void Framebuffer::Bind() const { glBindFramebuffer(GL_FRAMEBUFFER, id_); }
+
 void Framebuffer::Read(Bitmap* picture) {
-  glBindFramebuffer(GL_FRAMEBUFFER, id_);
+  Bind();
   ReadBoundFramebuffer(0, 0, width_, height_, picture);
 }
 

@@ -25,6 +25,8 @@ class Framebuffer {
 
   /// GL name, to draw into.
   [[nodiscard]] unsigned id() const { return id_; }
+  /// Makes it the one that is drawn into and read from.
+  void Bind() const;
   /// Waits for the end of drawing and reads the picture.
   void Read(Bitmap* picture);
 

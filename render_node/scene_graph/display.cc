@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "render_node/offscreen/egl_context.h"
+#include "render_node/offscreen/pixel_reader.h"
 #include "render_node/scene_graph/x11_window.h"
 #include "services/base/core/error.h"
 
@@ -57,6 +58,7 @@ class OffscreenDisplay : public Display {
     viewer_ = nullptr;
     window_ = nullptr;
     framebuffer_.reset();
+    reader_.reset();
     context_.Release();
   }
 
@@ -74,6 +76,22 @@ class OffscreenDisplay : public Display {
     context_.Release();
   }
 
+  void DrawAndStartRead() override {
+    context_.MakeCurrent();
+    viewer_->frame();
+    framebuffer_->Bind();
+    reader_->Start(0, 0, picture_.width, picture_.height);
+    context_.Release();
+  }
+
+  bool TakeRead(bool wait, Bitmap* picture) override {
+    if (!reader_->pending()) return false;
+    context_.MakeCurrent();
+    const bool taken = reader_->Take(wait, picture);
+    context_.Release();
+    return taken;
+  }
+
   [[nodiscard]] std::vector<int> TakeKeys() override { return {}; }
   [[nodiscard]] PixelBox picture() const override { return picture_; }
   [[nodiscard]] bool closed() const override { return false; }
@@ -84,6 +102,7 @@ class OffscreenDisplay : public Display {
   EglContext context_;
   PixelBox picture_{};
   std::unique_ptr<Framebuffer> framebuffer_;
+  std::unique_ptr<PixelReader> reader_ = std::make_unique<PixelReader>();
   osg::ref_ptr<osgViewer::Viewer> viewer_;
   osg::ref_ptr<osgViewer::GraphicsWindowEmbedded> window_;
 };
@@ -91,12 +110,14 @@ class OffscreenDisplay : public Display {
 class ReadAfterDraw : public osg::Camera::DrawCallback {
  public:
   void operator()(osg::RenderInfo& info) const override {
-    if (picture == nullptr) return;
     const osg::Viewport& box = *info.getCurrentCamera()->getViewport();
-    ReadBoundFramebuffer(static_cast<int>(box.x()), static_cast<int>(box.y()), static_cast<int>(box.width()),
-                         static_cast<int>(box.height()), picture);
+    const int x = static_cast<int>(box.x()), y = static_cast<int>(box.y());
+    const int width = static_cast<int>(box.width()), height = static_cast<int>(box.height());
+    if (picture != nullptr) ReadBoundFramebuffer(x, y, width, height, picture);
+    if (reader != nullptr) reader->Start(x, y, width, height);
   }
   Bitmap* picture = nullptr;
+  PixelReader* reader = nullptr;
 };
 
 /// Blackens the whole window, because OpenSceneGraph clears the camera's viewport only.
@@ -185,12 +206,32 @@ class WindowDisplay : public Display {
     window_ = std::make_unique<X11Window>(context_.get());
   }
 
+  ~WindowDisplay() override {
+    context_->makeCurrent();
+    reader_.reset();
+    context_->releaseContext();
+  }
+
   void Draw() override { viewer_.frame(); }
 
   void DrawAndRead(Bitmap* picture) override {
     read_->picture = picture;
     viewer_.frame();
     read_->picture = nullptr;
+  }
+
+  void DrawAndStartRead() override {
+    read_->reader = reader_.get();
+    viewer_.frame();
+    read_->reader = nullptr;
+  }
+
+  bool TakeRead(bool wait, Bitmap* picture) override {
+    if (!reader_->pending()) return false;
+    context_->makeCurrent();
+    const bool taken = reader_->Take(wait, picture);
+    context_->releaseContext();
+    return taken;
   }
 
   [[nodiscard]] std::vector<int> TakeKeys() override {
@@ -214,6 +255,7 @@ class WindowDisplay : public Display {
 
  private:
   bool is_gpu_ = false;
+  std::unique_ptr<PixelReader> reader_ = std::make_unique<PixelReader>();
   osg::ref_ptr<ReadAfterDraw> read_ = new ReadAfterDraw;
   osg::ref_ptr<Keyboard> keys_ = new Keyboard;
   osg::ref_ptr<osg::GraphicsContext> context_;

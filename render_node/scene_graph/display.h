@@ -17,6 +17,12 @@ class Display {
   virtual void Draw() = 0;
   /// Draws and reads the picture back.
   virtual void DrawAndRead(Bitmap* picture) = 0;
+  /// Draws and starts to read the picture back; on a GPU it waits for neither. A former picture that was not taken is
+  /// lost.
+  virtual void DrawAndStartRead() = 0;
+  /// Gives the picture of the last DrawAndStartRead if it has been read completely; with `wait` it waits for that.
+  /// Returns false if there is none.
+  virtual bool TakeRead(bool wait, Bitmap* picture) = 0;
   /// Keys pressed since the last call, as X key symbols. Also processes the window's events, so it must be called even
   /// if nothing is drawn.
   [[nodiscard]] virtual std::vector<int> TakeKeys() = 0;

@@ -110,6 +110,42 @@ void FullScene(const SceneView& scene, std::uint32_t width, std::uint32_t height
   }
 }
 
+/// A picture of 1080 lines as `auto` smooths it: not read back; read while the caller waits; read while it draws the
+/// next one.
+void ReadBack(const SceneView& scene, benchmark::Report* report) {
+  const std::string prefix = "render.read_back_1080p.";
+  if (!report->Wants(prefix)) return;
+  SceneView view = scene;
+  view.render.width = 1920;
+  view.render.height = 1080;
+  LaparoscopeView laparoscope(view);
+  const auto display = MakeOffscreenDisplay(laparoscope, view.render);
+  const float scale = display->is_gpu() ? 2.0f : 0.52f;
+  laparoscope.SetMostScale(std::max(1.0f, scale));
+  laparoscope.SetScale(scale);
+  const SyntheticMoment moment = MakeSyntheticMoment(view, 12.0);
+  Show(moment, &laparoscope);
+  std::vector<float> xyz;
+  Bitmap picture;
+  int step = 0;
+  const auto time = [&](const char* name, const auto& draw) {
+    const auto times = benchmark::TimeMs(5, report->quick() ? 20 : 60, [&] {
+      Sway(moment.tissue.xyz, ++step, &xyz);
+      laparoscope.SetTissue(xyz);
+      laparoscope.Update();
+      draw();
+    });
+    report->Add(prefix + name + "_frame_ms_p50", benchmark::Quantile(times, 0.5), "ms");
+    report->Add(prefix + name + "_frame_ms_p95", benchmark::Quantile(times, 0.95), "ms");
+  };
+  time("none", [&] { display->Draw(); });
+  time("waiting", [&] { display->DrawAndRead(&picture); });
+  time("deferred", [&] {
+    (void)display->TakeRead(true, &picture);
+    display->DrawAndStartRead();
+  });
+}
+
 /// Mean over blocks of n x n pixels.
 Bitmap Mean(const Bitmap& fine, int n) {
   Bitmap mean{fine.width / n, fine.height / n, {}};
@@ -324,6 +360,7 @@ int main(int argc, char** argv) {
     const SceneView view = data.View();
     render::FullScene(view, 1280, 720, &report);
     render::FullScene(view, 1920, 1080, &report);
+    render::ReadBack(view, &report);
     render::Edges(view, &report);
     render::Uploads(view, &report);
     render::Embedding(view, &report);

@@ -1,0 +1,31 @@
+#include "render_node/node/picture_outlet.h"
+
+namespace fulcrum::render {
+
+PictureOutlet::PictureOutlet(const std::filesystem::path& folder, bus::LoanOutput<Picture>* pictures)
+    : writer_(folder), stream_(pictures != nullptr ? std::make_unique<PictureStream>(pictures) : nullptr) {}
+
+void PictureOutlet::Give(const Bitmap& picture, const Use& use) {
+  if (use.live) stream_->Add(picture, use.header);
+  if (use.file && !writer_.Add(picture, use.session_time_s)) files_dropped_.fetch_add(1, std::memory_order_relaxed);
+}
+
+void PictureOutlet::Collect(bool wait, Display* display) {
+  if (!expected_ || !display->TakeRead(wait, &read_)) return;
+  Give(read_, *expected_);
+  expected_.reset();
+}
+
+std::string PictureOutlet::FillHealth(Health* health) const {
+  health->metrics.push_back({"png_written", static_cast<double>(writer_.written())});
+  health->metrics.push_back({"png_failed", static_cast<double>(writer_.failed())});
+  health->metrics.push_back({"png_dropped", static_cast<double>(files_dropped_.load(std::memory_order_relaxed))});
+  std::string error = writer_.last_error();
+  if (!stream_) return error;
+  health->metrics.push_back({"pictures_sent", static_cast<double>(stream_->sent())});
+  health->metrics.push_back({"pictures_late", static_cast<double>(stream_->dropped())});
+  health->metrics.push_back({"jpeg_ms", stream_->encode_ms()});
+  return error.empty() ? stream_->last_error() : error;
+}
+
+}  // namespace fulcrum::render
