@@ -336,6 +336,15 @@ void AddHeat(const SceneView& scene, std::vector<KnownAnswer>* answers) {
   answers->push_back({"cut_length.state", ValueOf(assessor, Measure::kCutLength), 12.3});
   answers->push_back({"cut_width.state", ValueOf(assessor, Measure::kCutWidth), 1.9});
   answers->push_back({"cut_off_way.state", ValueOf(assessor, Measure::kCutOffWay), 0.3});
+  for (const float mm2 : {1.0f, 3.0f, 7.0f}) {
+    ThermalEvent event;
+    event.session_time_s = 2;
+    event.kind = ThermalEventKind::kSolidBurn;
+    event.solid = 0;
+    event.value = 1e-6f * mm2;
+    assessor.Add(event);
+  }
+  answers->push_back({"organ_burn.events", ValueOf(assessor, Measure::kOrganBurn), 7});
   const std::array kinds{ThermalEventKind::kUreterWarning, ThermalEventKind::kUreterInjury,
                          ThermalEventKind::kNerveWarning, ThermalEventKind::kNerveInjury};
   const std::array measures{Measure::kUreterWarnings, Measure::kUreterInjuries, Measure::kNerveWarnings,
@@ -366,6 +375,8 @@ AssessedScene::AssessedScene() {
   view.protected_structures = structures;
   view.protected_points = points;
   view.membrane.texel_m = 1e-4f;
+  view.tube_surface = surface;
+  view.tube_vertex_count = 3;
   view.tools[0].kind = ToolKind::kGrasper;
   view.tools[1].kind = ToolKind::kHook;
 }

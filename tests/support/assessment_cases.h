@@ -15,6 +15,7 @@ struct AssessedScene {
   std::vector<Vec2f> line;
   std::vector<ProtectedStructure> structures;
   std::vector<ProtectedPoint> points;
+  std::vector<Triangle> surface{{0, 1, 2}};  ///< Of the organ.
   SceneView view;
 };
 

@@ -15,7 +15,7 @@ namespace {
 
 /// Identifies the layout; must change with it.
 constexpr std::uint64_t kLayout = 0x7468726d'00000008ull;
-constexpr std::uint64_t kSolidLayout = 0x736f6c69'00000001ull;
+constexpr std::uint64_t kSolidLayout = 0x736f6c69'00000002ull;
 /// A checkpoint of one model cannot be restored by another, so the model is part of the layout.
 constexpr std::uint64_t LayoutOf(ThermalModel model) { return kLayout + (static_cast<std::uint64_t>(model) << 16); }
 /// Bytes for tiles: about 1100 with all their arrays, enough for half a metre of cut; a checkpoint that needs
@@ -279,7 +279,7 @@ struct SolidSurface::Record {
   Ledger ledger;
   float highest_C, power_W;
   BySolid dead_m2, reported_m2;
-  std::uint32_t tile_count, used;
+  std::uint32_t tile_count, used, warned, spare;
 
   [[nodiscard]] bool Plausible() const {
     constexpr float kMost_m2 = 100;
@@ -305,6 +305,7 @@ std::size_t SolidSurface::Save(std::span<std::byte> out) const {
   record.dead_m2 = dead_m2_;
   record.reported_m2 = reported_m2_;
   record.power_W = power_W_;
+  record.warned = warned_;
   record.tile_count = StoredTiles(field_);
   record.used = 1;
   writer.PutValue(record);
@@ -341,6 +342,7 @@ bool SolidSurface::Restore(std::span<const std::byte> bytes) {
   dead_m2_ = record.dead_m2;
   reported_m2_ = record.reported_m2;
   power_W_ = record.power_W;
+  warned_ = record.warned;
   source_.Import(window);
   return true;
 }

@@ -8,6 +8,7 @@
 
 #include "services/base/core/hash.h"
 #include "thermal_node/coupling/tip_parts.h"
+#include "thermal_node/protected/protected_structures.h"
 #include "thermal_node/volume/volume_material.h"
 
 namespace fulcrum::thermal {
@@ -49,6 +50,7 @@ SolidSurface::SolidSurface(const TissueScene& scene, SolidCharts charts)
 
 bool SolidSurface::Step(std::span<const TipInput> tips, float dt_s, Interface* hook) {
   burns_.clear();
+  warnings_.clear();
   const bool acts =
       std::any_of(tips.begin(), tips.end(), [&](const TipInput& tip) { return Acts(tip, hook->hook_theta); });
   if (!acts && field_.idle()) {
@@ -88,8 +90,7 @@ void SolidSurface::ApplySource(std::span<const TipInput> tips, float dt_s, float
   });
 }
 
-void SolidSurface::AddDead(const Tile& tile, std::array<double, kMaxSolids>* cells,
-                           std::array<CellIndex, kMaxSolids>* where) {
+void SolidSurface::CountCells(const Tile& tile, std::array<Count, kMaxSolids>* counts) {
   const CellIndex corner{tile.tx * kTile, tile.ty * kTile};
   std::vector<Index>& charts = charts_of_tile_[static_cast<std::size_t>(tile.index)];
   if (charts.empty()) {
@@ -102,27 +103,40 @@ void SolidSurface::AddDead(const Tile& tile, std::array<double, kMaxSolids>* cel
   }
   for (int k = 0; k < kTileCells; ++k) {
     const bool tissue = (tile.state.flags[k] & (kOutside | kQuarantined)) == 0;
-    if (!tissue || (tile.state.omega_cell[k] < 1.0f && (tile.state.flags[k] & kRemoved) == 0)) continue;
+    const float omega = tile.state.omega_cell[k], theta = tile.theta[ThetaIndex(k % kTile, k / kTile)];
+    if (!tissue || (theta <= 0.0f && omega <= 0.0f)) continue;
     const CellIndex cell{corner.ix + k % kTile, corner.iy + k / kTile};
     const auto here = std::find_if(charts.begin(), charts.end(),
                                    [&](Index i) { return charts_.charts[i].Contains(cell.ix, cell.iy); });
     const Index solid = here != charts.end() ? charts_.charts[*here].solid : 0;
-    (*cells)[solid] += static_cast<double>(tile.geometry.area[k]);
-    (*where)[solid] = cell;
+    Count& count = (*counts)[solid];
+    if (theta > count.theta) {
+      count.theta = theta;
+      count.hottest = cell;
+    }
+    count.omega = std::max(count.omega, omega);
+    if (omega < kInjuryOmega && (tile.state.flags[k] & kRemoved) == 0) continue;
+    count.dead += static_cast<double>(tile.geometry.area[k]);
+    count.last_dead = cell;
   }
 }
 
 void SolidSurface::MeasureBurns() {
-  std::array<double, kMaxSolids> cells{};
-  std::array<CellIndex, kMaxSolids> where{};
+  std::array<Count, kMaxSolids> counts;
   for (const auto& tile : field_.tiles()) {
-    if (tile) AddDead(*tile, &cells, &where);
+    if (tile) CountCells(*tile, &counts);
   }
   for (Index solid = 0; solid < kMaxSolids; ++solid) {
-    dead_m2_[solid] = static_cast<float>(cells[solid]) * kSolidCell_m * kSolidCell_m;
+    const Count& count = counts[solid];
+    const float hottest_C = material_.body_C + count.theta;
+    if (!warned(solid) && (hottest_C >= kWarning_C || count.omega >= kWarningOmega)) {
+      warned_ |= 1u << solid;
+      warnings_.push_back({solid, field_.sheet().CentreOf(count.hottest), hottest_C});
+    }
+    dead_m2_[solid] = static_cast<float>(count.dead) * kSolidCell_m * kSolidCell_m;
     float& reported_m2 = reported_m2_[solid];
     if (dead_m2_[solid] < reported_m2 + kReported_m2) continue;
-    const Vec2f at = SolidAt(place_) == solid ? place_ : field_.sheet().CentreOf(where[solid]);
+    const Vec2f at = SolidAt(place_) == solid ? place_ : field_.sheet().CentreOf(count.last_dead);
     burns_.push_back({solid, reported_m2 == 0.0f, at, material_.body_C + field_.MaxTheta(), dead_m2_[solid]});
     reported_m2 = dead_m2_[solid];
   }
@@ -149,6 +163,8 @@ void SolidSurface::Clear() {
   source_.Import({});
   ledger_ = {};
   burns_.clear();
+  warnings_.clear();
+  warned_ = 0;
   frame_ = 0;
   power_W_ = set_power_W_ = voltage_V_ = highest_C_ = 0;
   shortened_ = 0;

@@ -29,6 +29,13 @@ inline constexpr float kSolidDisc_m = 1e-3f;
 /// scene's membrane in every depth, since serosa covers most organs.
 [[nodiscard]] Material MakeSolidMaterial(const ThermalParams& params);
 
+/// A solid whose surface has become warm or damaged enough for a warning (protected/protected_structures.h).
+struct SolidWarning {
+  Index solid = 0;
+  Vec2f material = Vec2f::Zero();  ///< Hottest cell of the solid, in the charts [m].
+  float temperature_C = 0;         ///< There.
+};
+
 struct SolidBurn {
   Index solid = 0;                 ///< Index in TissueScene::solids; 0 in a scene of one organ.
   bool first = false;              ///< The first of this solid.
@@ -69,6 +76,9 @@ class SolidSurface {
   [[nodiscard]] float dead_m2() const;
   /// Burns to be reported after the last Step: of each solid at its first square millimetre and each further one.
   [[nodiscard]] std::span<const SolidBurn> burns() const { return burns_; }
+  /// Warnings after the last Step: one of each solid, at the first count of its cells that gives cause for one.
+  [[nodiscard]] std::span<const SolidWarning> warnings() const { return warnings_; }
+  [[nodiscard]] bool warned(Index solid) const { return solid < kMaxSolids && (warned_ >> solid & 1u) != 0; }
   /// Whether a burn of this solid has been reported since the start.
   [[nodiscard]] bool reported(Index solid) const { return solid < kMaxSolids && reported_m2_[solid] > 0.0f; }
 
@@ -90,11 +100,18 @@ class SolidSurface {
   struct Record;
   SolidSurface(const TissueScene& scene, SolidCharts charts);
   void ApplySource(std::span<const TipInput> tips, float dt_s, float from, float to);
+  /// What the cells of a solid show.
+  struct Count {
+    double dead = 0;  ///< Area of its dead cells, in cells.
+    CellIndex last_dead, hottest;
+    float theta = -1;  ///< Of the hottest cell [K].
+    float omega = 0;   ///< Largest damage integral of cell death.
+  };
   void MeasureBurns();
   /// Solid of a place in the charts; kNoIndex: none.
   [[nodiscard]] Index SolidAt(const Vec2f& material) const;
-  /// Adds the dead area of a tile to that of its solids, in cells, and where the last dead cell of each lies.
-  void AddDead(const Tile& tile, std::array<double, kMaxSolids>* cells, std::array<CellIndex, kMaxSolids>* where);
+  /// Adds a tile's cells to the counts of their solids.
+  void CountCells(const Tile& tile, std::array<Count, kMaxSolids>* counts);
 
   ThermalParams params_;
   Material material_;
@@ -106,7 +123,9 @@ class SolidSurface {
   Ledger ledger_;
   using BySolid = std::array<float, kMaxSolids>;
   std::vector<SolidBurn> burns_;
-  std::uint64_t frame_ = 0;  ///< Frames in which something was computed.
+  std::vector<SolidWarning> warnings_;
+  std::uint32_t warned_ = 0;  ///< Bit of each solid; kMaxSolids bits.
+  std::uint64_t frame_ = 0;   ///< Frames in which something was computed.
   float power_W_ = 0, set_power_W_ = 0, voltage_V_ = 0, highest_C_ = 0, left_out_ = 0;
   std::uint32_t shortened_ = 0;
   Vec2f place_ = Vec2f::Zero();  ///< Of the last sample that heated [m].

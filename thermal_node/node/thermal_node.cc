@@ -241,6 +241,12 @@ void ThermalNode::PublishOpenCells(const Tick& tick) {
 void ThermalNode::PublishEvents(const Tick& tick) {
   for (const SolverEvent& event : solver_.events()) PublishEvent(tick, event);
   if (!solids_stepped_) return;
+  for (const SolidWarning& warning : solids_->warnings()) {
+    const std::optional<ThermalEventKind> kind = WarningOf(warning.solid);
+    if (!kind) continue;
+    PublishEvent(tick, {*kind, warning.material, warning.temperature_C, 0.0f},
+                 static_cast<std::uint8_t>(warning.solid));
+  }
   for (const SolidBurn& burn : solids_->burns()) {
     const SolverEvent event{ThermalEventKind::kSolidBurn, burn.material, burn.temperature_C, burn.dead_m2};
     PublishEvent(tick, event, static_cast<std::uint8_t>(burn.solid));
@@ -259,6 +265,13 @@ std::optional<ThermalEventKind> ThermalNode::InjuryOf(Index solid) const {
   if (look == SolidLook::kUreter) return ThermalEventKind::kUreterInjury;
   if (look == SolidLook::kNerve) return ThermalEventKind::kNerveInjury;
   return std::nullopt;
+}
+
+std::optional<ThermalEventKind> ThermalNode::WarningOf(Index solid) const {
+  const std::optional<ThermalEventKind> injury = InjuryOf(solid);
+  if (!injury) return std::nullopt;
+  return *injury == ThermalEventKind::kUreterInjury ? ThermalEventKind::kUreterWarning
+                                                    : ThermalEventKind::kNerveWarning;
 }
 
 void ThermalNode::PublishEvent(const Tick& tick, const SolverEvent& event, std::uint8_t solid) {
@@ -354,7 +367,9 @@ void ThermalNode::NoteHealth() {
     f.delivered_J += solids_->ledger().generator;
     f.solids_dead_m2 = solids_->dead_m2();
     for (Index solid = 0; solid < scene_.solids.size(); ++solid) {
-      f.solver.injuries += solids_->reported(solid) && InjuryOf(solid) ? 1 : 0;
+      if (!InjuryOf(solid)) continue;
+      f.solver.injuries += solids_->reported(solid) ? 1 : 0;
+      f.solver.warnings += solids_->warned(solid) ? 1 : 0;
     }
     f.solver.highest_C = std::max(f.solver.highest_C, solids_->highest_C());
     f.solver.present_C = std::max(f.solver.present_C, scene_.thermal.body_temperature_C + solids_->field().MaxTheta());

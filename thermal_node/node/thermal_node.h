@@ -80,6 +80,8 @@ class ThermalNode {
   void StepSolids(double dt_s);
   [[nodiscard]] std::uint64_t StateHash() const;
   [[nodiscard]] std::optional<ThermalEventKind> InjuryOf(Index solid) const;
+  /// The warning before that injury.
+  [[nodiscard]] std::optional<ThermalEventKind> WarningOf(Index solid) const;
   /// Reads the torn edges, if a new message arrived.
   void TakeTears();
   void SaveCheckpoint();

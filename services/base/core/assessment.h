@@ -31,6 +31,7 @@ enum class Measure : std::uint32_t {
   kDeviationMean,
   kDeviationMax,
   kDamageBeyondMargin,
+  kOrganBurn,
   kOffCentre,
   kHorizon,
   kLensSmeared,
@@ -39,7 +40,7 @@ enum class Measure : std::uint32_t {
   kNerveWarnings,
   kNerveInjuries
 };
-inline constexpr std::size_t kMeasureCount = 25;
+inline constexpr std::size_t kMeasureCount = 26;
 
 /// Part of a measure in the score.
 enum class MeasureRole : std::uint8_t {
@@ -88,6 +89,8 @@ inline constexpr std::array<MeasureInfo, kMeasureCount> kMeasures{{
      3, 0, 100, 5},
     {"damage_beyond_margin", "damage_beyond_margin_mm2", "thermal damage beyond the margin", "mm²", 1,
      MeasureRole::kSkill, false, false, 5, 0, 1e5f, 10},
+    {"organ_burn", "organ_burn_mm2", "burnt surface of organs", "mm²", 1, MeasureRole::kSkill, false, false, 5, 0, 1e5f,
+     5},
     {"off_centre", "off_centre_deg", "tool off the middle of the picture", "°", 1, MeasureRole::kSkill, false, false,
      12, 0, 180, 0},
     {"horizon", "horizon_deg", "tilt of the horizon", "°", 1, MeasureRole::kSkill, false, false, 5, 0, 180, 0},

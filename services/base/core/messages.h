@@ -350,7 +350,8 @@ struct ThermalEvent {
   /// Kind-specific: cut length so far [m] for kCut, damage integral for injuries, the solid's dead area [m^2] for
   /// kSolidBurn.
   float value = 0;
-  /// What was burnt, for kSolidBurn and injuries by it: index in TissueScene::solids, 0 in a scene of one organ.
+  /// What was burnt, for kSolidBurn and for warnings and injuries of a solid: index in TissueScene::solids, 0 in a
+  /// scene of one organ.
   std::uint8_t solid = kNoSolid;
   std::uint64_t topology_revision = 0;
 };

@@ -26,6 +26,11 @@ inline constexpr Index kMaxSolids = 25;  ///< Of a scene: the organ and others.
   return scene.tube_vertex_count > 0 ? 1 : 0;
 }
 
+/// Whether a burn of this solid is harm to an organ: fat is what the hook goes through on its way to them.
+[[nodiscard]] inline bool IsOrgan(const TissueScene& scene, Index solid) {
+  return scene.solids.empty() || (solid < scene.solids.size() && scene.solids[solid].look != SolidLook::kFat);
+}
+
 [[nodiscard]] inline float YoungsModulusOf(const TissueScene& scene, Index solid) {
   return scene.solids.empty() ? scene.physics.tube_youngs_modulus_Pa : scene.solids[solid].youngs_modulus_Pa;
 }

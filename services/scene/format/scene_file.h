@@ -11,9 +11,9 @@
 
 namespace fulcrum::scene {
 
-inline constexpr std::uint32_t kSceneFileVersion = 14;
+inline constexpr std::uint32_t kSceneFileVersion = 15;
 /// Version of what the content hash is taken of; another one changes the hash of every scene.
-inline constexpr std::uint32_t kSceneContentVersion = 11;
+inline constexpr std::uint32_t kSceneContentVersion = 12;
 
 /// Owns the arrays of a scene under construction or in a test; `View()` is what nodes read.
 struct SceneData {

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
+
+#include "services/base/core/solid_charts.h"
 
 namespace fulcrum::assessment {
 namespace {
@@ -117,9 +120,13 @@ void Assessor::Add(const ThermalEvent& event) {
       ++alarms_[2];
       Raise(Prompt::kNerveHot, time_s + kHappened_s);
       break;
-    case ThermalEventKind::kSolidBurn:
+    case ThermalEventKind::kSolidBurn: {
+      if (event.solid >= kMaxSolids || !IsOrgan(scene_, event.solid)) break;
+      double& burnt_m2 = burnt_m2_[event.solid];
+      burnt_m2 = std::max(burnt_m2, static_cast<double>(event.value));
       Raise(Prompt::kOrganBurnt, time_s + kHappened_s);
       break;
+    }
     case ThermalEventKind::kUreterInjury:
     case ThermalEventKind::kNerveInjury:
       ++alarms_[event.kind == ThermalEventKind::kUreterInjury ? 1 : 3];
@@ -208,6 +215,7 @@ void Assessor::SetOfHook(MeasureValues* session) const {
   set(Measure::kUreterInjuries, alarms_[1]);
   set(Measure::kNerveWarnings, alarms_[2]);
   set(Measure::kNerveInjuries, alarms_[3]);
+  if (SolidsBurn(scene_)) set(Measure::kOrganBurn, 1e6 * std::accumulate(burnt_m2_.begin(), burnt_m2_.end(), 0.0));
   if (!line_.line().empty()) set(Measure::kDamageBeyondMargin, 1e6 * damage_.beyond_margin_m2());
 }
 

@@ -16,6 +16,7 @@
 
 #include "services/base/core/generator_inputs.h"
 #include "services/base/core/scene_view.h"
+#include "services/base/core/solids.h"
 #include "services/session/assessment/damage_map.h"
 #include "services/session/assessment/force_meter.h"
 #include "services/session/assessment/line_meter.h"
@@ -81,6 +82,7 @@ class Assessor {
   std::deque<HookSample> contacts_;  ///< Contacts that wait for the pedal state of their time.
   DamageMap damage_;
   double cut_length_m_ = 0, cut_width_m_ = 0, cut_off_way_m_ = 0;
+  std::array<double, kMaxSolids> burnt_m2_{};  ///< Dead surface of each organ.
   std::array<int, 4> alarms_{};  ///< Counts of ureter warnings, ureter injuries, nerve warnings, nerve injuries.
   std::array<double, kPromptCount> prompt_until_s_{};
 };

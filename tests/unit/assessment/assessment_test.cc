@@ -118,6 +118,37 @@ TEST(Assessment, APhysicsNodeThatComesBackIsNoSlip) {
   EXPECT_EQ(ValueOf(run.assessor, Measure::kGraspSlips), 0);
 }
 
+TEST(Assessment, BurntSurfaceCountsByOrganAndFatIsNone) {
+  test::AssessedScene scene;
+  std::array<Solid, 3> solids{};
+  solids[0].look = SolidLook::kLiver;
+  solids[1].look = SolidLook::kFat;
+  solids[2].look = SolidLook::kUreter;
+  scene.view.solids = solids;
+  scene.view.tube_surface = {};
+  EXPECT_TRUE(std::isnan(ValueOf(Assessor(scene.view), Measure::kOrganBurn))) << "no surface that can burn";
+  scene.view.tube_surface = scene.surface;
+  Assessor assessor(scene.view);
+  assessor.Begin(test::kStart_ns);
+  EXPECT_EQ(ValueOf(assessor, Measure::kOrganBurn), 0);
+  ThermalEvent event;
+  event.kind = ThermalEventKind::kSolidBurn;
+  const auto burn = [&](double time_s, int solid, float mm2) {
+    event.session_time_s = time_s;
+    event.solid = static_cast<std::uint8_t>(solid);
+    event.value = 1e-6f * mm2;
+    assessor.Add(event);
+  };
+  burn(1, 1, 40);
+  EXPECT_EQ(assessor.PromptsAt(1.1), 0u) << "fat is no organ";
+  burn(2, 0, 1);
+  burn(3, 0, 4);
+  burn(4, 2, 2);
+  burn(5, 0, 3);  // A node that has come back from an older checkpoint.
+  burn(6, kNoSolid, 100);
+  EXPECT_NEAR(ValueOf(assessor, Measure::kOrganBurn), 6, 1e-5);
+}
+
 TEST(Assessment, PatchesThatOverlapAndComeAgainCountOnce) {
   Running run;
   const auto block = [](const Eigen::Vector2d& at) {
@@ -167,6 +198,7 @@ TEST(Prompts, SayWhatIsWrongWhileItIs) {
   ThermalEvent event;
   event.session_time_s = 8;
   event.kind = ThermalEventKind::kSolidBurn;
+  event.solid = 0;
   run.assessor.Add(event);
   EXPECT_EQ(run.assessor.PromptsAt(8.1), BitOf(Prompt::kOrganBurnt));
   event.kind = ThermalEventKind::kNerveInjury;

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "tests/unit/thermal/node_fixture.h"
+#include "thermal_node/protected/protected_structures.h"
 
 namespace fulcrum::thermal {
 namespace {
@@ -92,6 +94,45 @@ TEST_F(NodeOverSolid, ABurnGivesAPatchOfItsOwnAtlasAndAnEvent) {
   const auto x = static_cast<std::size_t>(at.x()) - last.header.origin_x;
   const auto y = static_cast<std::size_t>(at.y()) - last.header.origin_y;
   EXPECT_GT(last.texels[4 * (y * kPatchTexels + x) + 1], 200) << "damage beneath the metal";
+}
+
+TEST_F(NodeOverSolid, AUreterIsWarnedOfOnceBeforeItIsInjured) {
+  std::vector<Solid> solids(1);
+  solids[0].look = SolidLook::kUreter;
+  scene_.solids = solids;
+  OpenCheckpoint();
+  auto node = MakeNode();
+  std::vector<ThermalEventKind> kinds;
+  const auto take = [&] {
+    ThermalEvent event;
+    while (bus_.event_in->TakeNext(&event)) {
+      if (event.solid != 0) continue;
+      kinds.push_back(event.kind);
+      if (event.kind == ThermalEventKind::kUreterWarning) {
+        EXPECT_GE(event.temperature_C, kWarning_C);
+        EXPECT_LT((event.material - chart_.Material({0.02f, 0.015f, -0.02f})).norm(), 2e-3f);
+      }
+    }
+  };
+  const auto count = [&](ThermalEventKind kind) { return std::ranges::count(kinds, kind); };
+  for (int n = 0; n < 400 && count(ThermalEventKind::kUreterWarning) == 0; ++n) {
+    Burn(node.get(), 0.02f, CauteryMode::kCoag, 2);
+    take();
+  }
+  ASSERT_EQ(count(ThermalEventKind::kUreterWarning), 1);
+  EXPECT_EQ(count(ThermalEventKind::kSolidBurn), 0) << "nothing is dead yet";
+  EXPECT_EQ(MetricOf(*node, "warnings"), 1.0);
+  for (int n = 0; n < 20; ++n) Step(node.get());  // Until the next checkpoint.
+  node.reset();
+  OpenCheckpoint();
+  node = MakeNode();
+  ASSERT_TRUE(node->restored());
+  EXPECT_EQ(MetricOf(*node, "warnings"), 1.0);
+  for (int n = 0; n < 150; ++n) Burn(node.get(), 0.02f);
+  take();
+  EXPECT_EQ(count(ThermalEventKind::kUreterWarning), 1);
+  EXPECT_EQ(count(ThermalEventKind::kUreterInjury), 1);
+  EXPECT_EQ(MetricOf(*node, "injuries"), 1.0);
 }
 
 TEST_F(NodeOverSolid, TheBurnOutlivesARestart) {
