@@ -378,7 +378,11 @@ std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const P
                   report.triangles));
     if (!use.is_organ) {
       NewNeighbour& neighbour = scene.neighbours.emplace_back();
-      neighbour.surface = {use.name, use.role, import.out / file, Vec3f::Zero(), use.triangles_max, use.collides};
+      neighbour.surface.name = use.name;
+      neighbour.surface.role = use.role;
+      neighbour.surface.file = import.out / file;
+      neighbour.surface.triangles_max = use.triangles_max;
+      neighbour.surface.collides = use.collides;
       neighbour.material = use.material;
     }
     reports.push_back(report);

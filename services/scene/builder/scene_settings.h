@@ -34,7 +34,7 @@ struct TubeSettings {
   BrickSplit split = BrickSplit::kSix;
 };
 
-inline constexpr int kMostSurroundings = 16;        ///< Of an imported organ.
+inline constexpr int kMostSurroundings = 16;        ///< Of an imported organ, and as many fixed surfaces.
 inline constexpr int kMostBodies = kMaxSolids - 1;  ///< Beside the organ.
 
 /// A body of simple shape: an ellipsoid, or what a circle sweeps along a smooth curve, rounded at both ends.
@@ -48,6 +48,18 @@ struct ShapeSettings {
 
 /// Of a body that is filled: a scene's vertices (kMaxTissueVertices) have some five tetrahedra each.
 inline constexpr int kMostTets = 1000000;
+
+/// A surface that does not deform, in the frame in which the organ is described.
+struct FixedSettings {
+  std::string name;
+  SurfaceRole role = SurfaceRole::kOther;
+  std::filesystem::path file;  ///< In the unit and from the origin of `import`; empty: `shape`.
+  ShapeSettings shape;
+  bool inside = false;             ///< Turned over: a closed surface is seen from inside.
+  Vec3f offset_m = Vec3f::Zero();  ///< Displacement, as by the assistant's retraction.
+  int triangles_max = 4000;        ///< The surface is decimated to this many triangles.
+  bool collides = false;
+};
 
 /// The organ read from a mesh: its tetrahedra unchanged, or a surface that is filled with tetrahedra (without `wall_m`
 /// wall and lumen are one body). The membrane covers a stretch of the organ's centre line, on the side from which it is
@@ -80,15 +92,7 @@ struct ImportSettings {
   double flare_m = 0.010;   ///< Length by which the membrane then continues away from the organ on either side.
   double bed_m = 0.025;     ///< Length of a fixed surface that continues it on either side.
   double cavity_m = 0;      ///< Radius of a wall around the stretch, seen from inside; 0: none.
-  struct Surrounding {
-    std::string name;
-    SurfaceRole role = SurfaceRole::kOther;
-    std::filesystem::path file;
-    Vec3f offset_m = Vec3f::Zero();  ///< Displacement, as by the assistant's retraction.
-    int triangles_max = 4000;        ///< The surface is decimated to this many triangles.
-    bool collides = false;
-  };
-  std::vector<Surrounding> surroundings;
+  std::vector<FixedSettings> surroundings;  ///< Files only.
 };
 
 /// What a body is made of.
@@ -195,6 +199,7 @@ struct SceneSettings {
   TubeSettings tube;      ///< Used without `import`.
   std::optional<ImportSettings> import;
   std::vector<BodySettings> bodies;
+  std::vector<FixedSettings> fixed;
   std::vector<AttachSettings> attach;
   MembraneSettings membrane;
   std::vector<SheetSettings> sheets;

@@ -136,6 +136,28 @@ void AddSheets(const SceneSettings& settings, const Placement& placement, const 
   }
 }
 
+void AddFixed(const std::vector<FixedSettings>& surfaces, const SceneSettings& settings, const Placement& placement,
+              const Progress& progress, Anatomy* anatomy) {
+  for (const FixedSettings& wanted : surfaces) {
+    ImportSettings like = settings.import.value_or(ImportSettings{});
+    TriangleMesh mesh = Named("fixed surface", wanted.name, [&] {
+      if (!wanted.file.empty()) return SurfaceOf(ReadMesh(wanted.file));
+      // Shapes are in metres already.
+      like.scale_m = 1;
+      return SurfaceOfShape(wanted.shape);
+    });
+    ToMetres(like, wanted.offset_m, &mesh.vertices);
+    for (Vec3d& p : mesh.vertices) p = placement.ToWorld(p);
+    mesh = Decimate(mesh, wanted.triangles_max);
+    if (wanted.inside) {
+      for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
+    }
+    Say(progress, "%s: %zu triangles", wanted.name.c_str(), mesh.triangles.size());
+    anatomy->surroundings.push_back(
+        {wanted.name, wanted.role, wanted.collides, std::move(mesh.vertices), std::move(mesh.triangles)});
+  }
+}
+
 void AddBodies(const SceneSettings& settings, const Placement& placement, const Progress& progress, Anatomy* anatomy) {
   const ImportSettings like = settings.import.value_or(ImportSettings{});
   for (const BodySettings& wanted : settings.bodies) {

@@ -16,6 +16,7 @@ SceneData BuildScene(const SceneSettings& settings, const Progress& progress) {
     if (settings.has_organ) anatomy = ProceduralAnatomy(settings);
     AddBodies(settings, {}, progress, &anatomy);
     AddSheets(settings, {}, progress, &anatomy);
+    AddFixed(settings.fixed, settings, {}, progress, &anatomy);
   }
   SceneData scene = AssembleScene(settings, anatomy);
   AddToolMeshes(settings, &scene);

@@ -187,14 +187,8 @@ Anatomy ImportAnatomy(const SceneSettings& described, const Progress& progress) 
   if (import.cavity_m > 0) {
     anatomy.surroundings.push_back(Cavity(membrane.cavity_centre, import.cavity_m));
   }
-  for (const ImportSettings::Surrounding& s : import.surroundings) {
-    TriangleMesh mesh = SurfaceOf(ReadMesh(s.file));
-    ToMetres(import, s.offset_m, &mesh.vertices);
-    Place(placement, &mesh);
-    mesh = Decimate(mesh, s.triangles_max);
-    Say(progress, "%s: %zu triangles", s.name.c_str(), mesh.triangles.size());
-    anatomy.surroundings.push_back({s.name, s.role, s.collides, std::move(mesh.vertices), std::move(mesh.triangles)});
-  }
+  AddFixed(import.surroundings, settings, placement, progress, &anatomy);
+  AddFixed(settings.fixed, settings, placement, progress, &anatomy);
   return anatomy;
 }
 

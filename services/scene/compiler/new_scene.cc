@@ -206,7 +206,7 @@ std::string OrganText(const NewScene& scene, const ImportSettings& import, bool 
   if (any_fixed) text += "    surroundings:\n";
   for (const NewNeighbour& neighbour : scene.neighbours) {
     if (!neighbour.material.empty()) continue;
-    const ImportSettings::Surrounding& s = neighbour.surface;
+    const FixedSettings& s = neighbour.surface;
     text += "      - {name: " + s.name + ", role: " + std::string(RoleName(s.role)) +
             ", file: " + s.file.filename().string() +
             PrintText(", triangles_max: %d%s}\n", s.triangles_max, s.collides ? ", collides: true" : "");

@@ -14,7 +14,7 @@ namespace fulcrum::scene {
 
 /// Something beside the organ.
 struct NewNeighbour {
-  ImportSettings::Surrounding surface;
+  FixedSettings surface;
   std::string material;  ///< Of a deformable body; empty: it is fixed.
   double tet_edge_mm = 6;
   Vec3d held_side = Vec3d::UnitZ();  ///< In the frame of the file.

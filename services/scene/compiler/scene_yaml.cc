@@ -33,11 +33,6 @@ const StrictMap::Choices<ToolKind> kToolKinds = {{"none", ToolKind::kNone},
                                                  {"scope", ToolKind::kScope}};
 const StrictMap::Choices<ProtectedKind> kProtectedKinds = {{"ureter", ProtectedKind::kUreter},
                                                            {"nerve", ProtectedKind::kNerve}};
-const StrictMap::Choices<SurfaceRole> kRoles = {{"abdominal_wall", SurfaceRole::kAbdominalWall},
-                                                {"retroperitoneum", SurfaceRole::kRetroperitoneum},
-                                                {"pelvis", SurfaceRole::kPelvis},
-                                                {"bladder", SurfaceRole::kBladder},
-                                                {"other", SurfaceRole::kOther}};
 const StrictMap::Choices<std::uint32_t> kPedals = {
     {"up", kPedalNone}, {"cut", kPedalCut}, {"coag", kPedalCoag}, {"blend", kPedalBlend}};
 const StrictMap::Choices<BrickSplit> kSplits = {{"six", BrickSplit::kSix}, {"five", BrickSplit::kFive}};
@@ -141,14 +136,8 @@ void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Fol
   ReadSi(&map, "bed_mm", Range::Between(0, 150), &import->bed_m);
   ReadSi(&map, "cavity_mm", Range::Between(0, 1000), &import->cavity_m);
   for (StrictMap& entry : map.Maps("surroundings", 0, kMostSurroundings)) {
-    ImportSettings::Surrounding s;
-    s.name = entry.Text("name", 31);
-    s.role = entry.Choice("role", s.role, kRoles);
+    FixedSettings& s = import->surroundings.emplace_back(ReadFixedSurface(&entry));
     s.file = FindFile(entry, "file", entry.Text("file"), *folders);
-    s.offset_m = entry.Vector3Si("offset_mm", s.offset_m, Range::Between(-500, 500));
-    ReadInteger(&entry, "triangles_max", 100, 100000, &s.triangles_max);
-    s.collides = entry.Flag("collides", s.collides);
-    import->surroundings.push_back(s);
   }
 }
 
@@ -416,12 +405,13 @@ SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::fil
 }
 
 std::string_view RoleName(SurfaceRole role) {
-  return std::find_if(kRoles.begin(), kRoles.end(), [&](const auto& r) { return r.second == role; })->first;
+  return std::find_if(kSurfaceRoles.begin(), kSurfaceRoles.end(), [&](const auto& r) { return r.second == role; })
+      ->first;
 }
 
 SurfaceRole RoleNamed(const std::string& name) {
   std::string valid;
-  for (const auto& [word, role] : kRoles) {
+  for (const auto& [word, role] : kSurfaceRoles) {
     if (word == name) return role;
     valid += (valid.empty() ? "" : ", ") + std::string(word);
   }

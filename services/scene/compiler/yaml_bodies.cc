@@ -216,6 +216,16 @@ ShapeSettings ReadShape(StrictMap map) {
   return shape;
 }
 
+FixedSettings ReadFixedSurface(StrictMap* map) {
+  FixedSettings surface;
+  surface.name = map->Text("name", 31);
+  surface.role = map->Choice("role", surface.role, kSurfaceRoles);
+  surface.offset_m = map->Vector3Si("offset_mm", surface.offset_m, Range::Between(-500, 500));
+  ReadInteger(map, "triangles_max", 100, 100000, &surface.triangles_max);
+  surface.collides = map->Flag("collides", surface.collides);
+  return surface;
+}
+
 std::vector<StrictMap> ReadBodies(StrictMap* root, const FindMesh& find, const MaterialLibrary& materials,
                                   SceneSettings* scene) {
   std::set<std::string> names;
@@ -247,6 +257,14 @@ std::vector<StrictMap> ReadBodies(StrictMap* root, const FindMesh& find, const M
     ReadSi(&entry, "reach_mm", Range::Between(0.1, 50), &attach.reach_m);
     ReadSi(&entry, "youngs_modulus_kPa", Range::Between(0.001, 1e4), &attach.youngs_modulus_Pa);
     scene->attach.push_back(attach);
+  }
+  for (StrictMap& entry : root->Maps("fixed", 0, kMostSurroundings)) {
+    FixedSettings& surface = scene->fixed.emplace_back(ReadFixedSurface(&entry));
+    if (entry.Has("mesh") == entry.Has("shape")) entry.Fail("name", "needs either `mesh` or `shape`");
+    if (entry.Has("mesh")) surface.file = find(entry, "mesh");
+    if (auto shape = entry.OptionalMap("shape")) surface.shape = ReadShape(*shape);
+    surface.inside = entry.Flag("inside", surface.inside);
+    if (!names.insert(surface.name).second) entry.Fail("name", "is there twice");
   }
   return sheets;
 }

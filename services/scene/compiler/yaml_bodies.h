@@ -1,4 +1,4 @@
-// Reading the deformable bodies and sheets of a scene description: shapes, `bodies`, `sheets`, `attach`.
+// Reading the deformable bodies and sheets of a scene description: shapes, `bodies`, `sheets`, `attach`, `fixed`.
 #pragma once
 
 #include <filesystem>
@@ -18,10 +18,21 @@ std::vector<Vec3f> ReadLine(config::StrictMap* map);
 /// `ellipsoid_mm`, or `x_mm`, `y_mm`, `z_mm` and `radius_mm`. Throws InputError, as all functions here.
 ShapeSettings ReadShape(config::StrictMap map);
 
+/// Names of the roles of fixed surfaces.
+inline const config::StrictMap::Choices<SurfaceRole> kSurfaceRoles = {
+    {"abdominal_wall", SurfaceRole::kAbdominalWall},
+    {"retroperitoneum", SurfaceRole::kRetroperitoneum},
+    {"pelvis", SurfaceRole::kPelvis},
+    {"bladder", SurfaceRole::kBladder},
+    {"other", SurfaceRole::kOther}};
+
 /// Path of the file that a key names.
 using FindMesh = std::function<std::filesystem::path(const config::StrictMap&, const std::string& key)>;
 
-/// `bodies`, `sheets` and `attach` of a description, whose organ is known.
+/// What every fixed surface has: `name`, `role`, `offset_mm`, `triangles_max`, `collides`.
+FixedSettings ReadFixedSurface(config::StrictMap* map);
+
+/// `bodies`, `sheets`, `attach` and `fixed` of a description, whose organ is known.
 /// @return the maps of the sheets, for what depends on later sections.
 std::vector<config::StrictMap> ReadBodies(config::StrictMap* root, const FindMesh& find,
                                           const MaterialLibrary& materials, SceneSettings* scene);

@@ -162,6 +162,51 @@ struct Refused {
   const char *lines, *reason;
 };
 
+TEST(Bodies, FixedSurfacesNeedNoOrgan) {
+  const SceneSettings settings = ParseSceneYaml(
+                                     "name: fixed\nphysics: {mode: accurate}\n"
+                                     "bodies:\n"
+                                     "  - {name: lobe, material: liver, shape: {ellipsoid_mm: [15, 20, 10]}}\n"
+                                     "fixed:\n"
+                                     "  - {name: wall, shape: {ellipsoid_mm: [90, 80, 70]}, inside: true,\n"
+                                     "     role: abdominal_wall, triangles_max: 500}\n"
+                                     "  - {name: spleen, shape: {ellipsoid_mm: [12, 12, 12], at_mm: [40, 0, 0]},\n"
+                                     "     offset_mm: [0, 5, 0], collides: true}\n",
+                                     "x.yaml", {})
+                                     .settings;
+  const SceneData data = BuildScene(settings, {});
+  const SceneView scene = data.View();
+  EXPECT_FALSE(FindFault(scene));
+  ASSERT_EQ(scene.static_surfaces.size(), 2u);
+  const auto check = [&](const StaticSurface& surface, const Vec3f& centre, float least_m, float most_m, float side) {
+    for (Index k = 0; k < surface.triangle_count; ++k) {
+      const Triangle& t = scene.static_triangles[surface.first_triangle + k];
+      const Vec3f &a = scene.static_vertices[t[0]], &b = scene.static_vertices[t[1]], &c = scene.static_vertices[t[2]];
+      const Vec3f middle = (a + b + c) / 3 - centre;
+      EXPECT_GT(side * (b - a).cross(c - a).dot(middle), 0.0f) << surface.name << " faces the wrong side";
+      EXPECT_GT(middle.norm(), least_m);
+      EXPECT_LT(middle.norm(), most_m);
+    }
+  };
+  const StaticSurface &wall = scene.static_surfaces[0], &spleen = scene.static_surfaces[1];
+  EXPECT_STREQ(wall.name, "wall");
+  EXPECT_EQ(wall.role, SurfaceRole::kAbdominalWall);
+  EXPECT_EQ(wall.collides, 0u);
+  EXPECT_LE(wall.triangle_count, 500u);
+  check(wall, Vec3f::Zero(), 0.06f, 0.091f, -1);
+  EXPECT_EQ(spleen.collides, 1u);
+  check(spleen, Vec3f(0.040f, 0.005f, 0), 0.011f, 0.0121f, 1);
+}
+
+TEST(Bodies, BadFixedSurfacesAreRefused) {
+  const auto of = [](const std::string& entry) { return RefusalOf("fixed: [" + entry + "]\n"); };
+  EXPECT_NE(of("{name: a}").find("needs either `mesh` or `shape`"), std::string::npos) << of("{name: a}");
+  const std::string twice = "{name: a, shape: {ellipsoid_mm: [9, 9, 9]}}";
+  EXPECT_NE(of(twice + ", " + twice).find("is there twice"), std::string::npos);
+  EXPECT_NE(of("{name: a, role: spleen, shape: {ellipsoid_mm: [9, 9, 9]}}").find("role"), std::string::npos);
+  EXPECT_NE(of("{name: a, mesh: nowhere.stl}").find("nowhere.stl"), std::string::npos);
+}
+
 TEST(Bodies, BadOnesAreRefused) {
   const std::vector<Refused> all = {
       {"bodies: [{name: a, material: cheese, tube: {x_mm: [0, 1], y_mm: [0, 0], z_mm: [0, 0], radius_mm: [1]}}]\n",
