@@ -1,5 +1,5 @@
-// Cost of a picture, drawn in full and when nothing changes: the built-in scene in the middle of its cut, tissue
-// moving, off screen.
+// Cost of a picture, drawn in full and when nothing changes, and the error of its edges: the built-in scene in the
+// middle of its cut, off screen.
 #include <unistd.h>
 
 #include <algorithm>
@@ -20,11 +20,25 @@
 #include "render_node/scene_graph/atlas_texture.h"
 #include "render_node/scene_graph/display.h"
 #include "services/scene/builder/build.h"
+#include "tests/benchmark/render/parts.h"
 #include "tests/benchmark/report.h"
 #include "tests/integration/render/node_bus.h"
 #include "tests/integration/render/synthetic_scene.h"
+#include "tests/support/picture_statistics.h"
 
 namespace fulcrum::render {
+
+void Show(const SyntheticMoment& moment, LaparoscopeView* view) {
+  view->SetTissue(moment.tissue.xyz);
+  view->SetTopology(moment.topology);
+  for (const TemperaturePatch& patch : moment.patches) {
+    view->ApplyPatch(patch);
+  }
+  for (int tool = 0; tool < kMaxTools; ++tool) {
+    view->SetTool(tool, moment.tools.tools[static_cast<std::size_t>(tool)]);
+  }
+}
+
 namespace {
 
 double CpuMs(clockid_t clock) {
@@ -37,17 +51,6 @@ std::int64_t MonotonicNs() {
   timespec now;
   clock_gettime(CLOCK_MONOTONIC, &now);
   return std::int64_t{1'000'000'000} * now.tv_sec + now.tv_nsec;
-}
-
-void Show(const SyntheticMoment& moment, LaparoscopeView* view) {
-  view->SetTissue(moment.tissue.xyz);
-  view->SetTopology(moment.topology);
-  for (const TemperaturePatch& patch : moment.patches) {
-    view->ApplyPatch(patch);
-  }
-  for (int tool = 0; tool < kMaxTools; ++tool) {
-    view->SetTool(tool, moment.tools.tools[static_cast<std::size_t>(tool)]);
-  }
 }
 
 /// Moves the tissue slightly, so that no two pictures are equal.
@@ -162,11 +165,10 @@ Bitmap Mean(const Bitmap& fine, int n) {
   return mean;
 }
 
-/// Mean difference [of 255] from a picture of four by four samples a pixel, over its edges: the pixels that differ from
-/// a neighbour by more than kEdge.
+/// Mean difference [of 255] from a picture of four by four samples a pixel, over its edge pixels.
 void Edges(const SceneView& scene, benchmark::Report* report) {
   if (!report->Wants("render.edge_error")) return;
-  constexpr int kSamples = 4, kEdge = 24;
+  constexpr int kSamples = 4;
   const SyntheticMoment moment = MakeSyntheticMoment(scene, 12.0);
   const auto draw = [&](int size, float scale) {
     SceneView view = scene;
@@ -183,26 +185,13 @@ void Edges(const SceneView& scene, benchmark::Report* report) {
     return picture;
   };
   const Bitmap reference = Mean(draw(kSamples, 1), kSamples);
-  const auto at = [&](int x, int y) { return 3 * TexelIndex(x, y, reference.width); };
-  std::vector<std::size_t> edges;
-  for (int y = 1; y + 1 < reference.height; ++y) {
-    for (int x = 1; x + 1 < reference.width; ++x) {
-      int most = 0;
-      for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
-        for (std::size_t channel = 0; channel < 3; ++channel) {
-          most = std::max(most, std::abs(int{reference.rgb[at(x, y) + channel]} -
-                                         int{reference.rgb[at(x + dx, y + dy) + channel]}));
-        }
-      }
-      if (most > kEdge) edges.push_back(at(x, y));
-    }
-  }
-  for (const auto& [name, scale] : {std::pair{"low", 0.52f}, {"high", 1.0f}, {"smooth2", 2.0f}, {"smooth4", 4.0f}}) {
+  const std::vector<std::size_t> edges = EdgePixels(reference);
+  for (const auto& [name, scale] : kSampledScales) {
     const Bitmap picture = draw(1, scale);
     double sum = 0;
     for (const std::size_t edge : edges) {
       for (std::size_t channel = 0; channel < 3; ++channel) {
-        sum += std::abs(int{picture.rgb[edge + channel]} - int{reference.rgb[edge + channel]});
+        sum += std::abs(int{picture.rgb[3 * edge + channel]} - int{reference.rgb[3 * edge + channel]});
       }
     }
     report->Add(std::string("render.edge_error.") + name, sum / (3.0 * static_cast<double>(edges.size())), "1/255");
@@ -362,6 +351,8 @@ int main(int argc, char** argv) {
     render::FullScene(view, 1920, 1080, &report);
     render::ReadBack(view, &report);
     render::Edges(view, &report);
+    render::Flicker(view, &report);
+    render::LookFigures(view, &report);
     render::Uploads(view, &report);
     render::Embedding(view, &report);
     render::StaticScene(view, &report);

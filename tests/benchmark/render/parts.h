@@ -1,0 +1,26 @@
+// Parts of bench_render, each with its own keys.
+#pragma once
+
+#include <utility>
+
+#include "render_node/scene_graph/laparoscope_view.h"
+#include "tests/benchmark/report.h"
+#include "tests/integration/render/synthetic_scene.h"
+
+namespace fulcrum::render {
+
+/// Gives the view all of a moment but its handles.
+void Show(const SyntheticMoment& moment, LaparoscopeView* view);
+
+/// The qualities whose pictures are compared with many samples a pixel, by scale.
+constexpr std::pair<const char*, float> kSampledScales[] = {
+    {"low", 0.52f}, {"high", 1.0f}, {"smooth2", 2.0f}, {"smooth4", 4.0f}};
+
+/// render.look.*: pictures of several scenes beside published figures of endoscopic pictures. Prints the comparison as
+/// a table in lines `# |`.
+void LookFigures(const SceneView& built_in, benchmark::Report* report);
+
+/// render.temporal_flicker.*: edges while the scope creeps.
+void Flicker(const SceneView& scene, benchmark::Report* report);
+
+}  // namespace fulcrum::render
