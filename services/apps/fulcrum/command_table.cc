@@ -14,7 +14,7 @@ std::span<const CommandEntry> Commands() {
        "Make a scene around a mesh of an organ, check and draw a scene, explain a key.",
        "scene new liver --from liver.stl", Scene},
       {"import-anatomy", "import-anatomy LABELS [--map FILE --out DIR]",
-       "Make a scene from a patient's segmentation: a NIfTI label map, or a folder with a surface per organ.",
+       "Make a scene from a patient's segmentation: NIfTI, DICOM, or a folder with a surface per organ.",
        "import-anatomy pelvis.nii.gz --map labels.yaml --out pelvis", ImportAnatomy},
       {"console", "console [options]",
        "Serve the page of the cart's touch screen, which starts, shows and stops sessions, calibrates and replays.",

@@ -37,8 +37,8 @@ Options:
   --unit U                 of the mesh: m, cm, mm, um (default: the one in which it has the size of an organ)
   --at X,Y,Z               the middle of the membrane, in mm in the frame of the mesh (default: found)
   --facing X,Y,Z           direction from the organ to the membrane, in the frame of the mesh (default: found)
-  --anatomy FILE           a segmentation, as NIfTI label map or folder of surfaces: writes a mesh per organ, a scene and
-                           a report into --out; without --map, prints a map to be edited
+  --anatomy FILE           a segmentation, as NIfTI label map, DICOM segmentation or folder of surfaces: writes a mesh
+                           per organ, a scene and a report into --out; without --map, prints a map to be edited
   --map FILE               what becomes of each label or surface
   --quiet                  print no progress and no report
   --info FILE              print the content and quality of a compiled scene

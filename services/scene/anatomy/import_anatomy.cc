@@ -14,6 +14,7 @@
 #include "services/base/config/strict_yaml.h"
 #include "services/base/core/error.h"
 #include "services/base/core/escape.h"
+#include "services/scene/anatomy/dicom_segmentation.h"
 #include "services/scene/anatomy/surface_nets.h"
 #include "services/scene/builder/geometry.h"
 #include "services/scene/compiler/materials.h"
@@ -77,6 +78,20 @@ int PiecesOf(const TriangleMesh& mesh) {
   return static_cast<int>(roots.size());
 }
 
+const Segment* SegmentOf(const LabelMap& map, int label) {
+  const auto found = std::ranges::find_if(map.segments, [&](const Segment& s) { return s.number == label; });
+  return found == map.segments.end() ? nullptr : &*found;
+}
+
+/// What became of voxels that a label lacks; empty: nothing.
+std::string CoveredText(const LabelMap& map, int label) {
+  const Segment* segment = SegmentOf(map, label);
+  if (segment == nullptr || segment->covered == 0) return "";
+  return PrintText(
+      ". %zu more also belong to a segment with a higher number, which counts: leave that one out of the map",
+      segment->covered);
+}
+
 std::string Page(const AnatomyImport& import, const LabelMap& map, const std::vector<LabelReport>& reports) {
   const bool has_voxels = !map.labels.empty();
   const Mat3d axes = map.W_from_index.linear();
@@ -91,8 +106,15 @@ std::string Page(const AnatomyImport& import, const LabelMap& map, const std::ve
   page += ".</p><table><tr><th>organ";
   page += has_voxels ? "<th>label<th>voxels<th>ml of voxels<th>ml of mesh<th>difference" : "<th>ml of mesh";
   page += "<th>pieces<th>triangles";
+  std::string overlaps;
   for (const LabelReport& r : reports) {
+    const Segment* segment = SegmentOf(map, r.use.label);
+    if (segment != nullptr && segment->covered > 0) {
+      overlaps += PrintText(" %zu voxels of ", segment->covered) + EscapeHtml(r.use.name) +
+                  " also belong to a segment with a higher number, which counts.";
+    }
     page += "<tr><td>" + EscapeHtml(r.use.name) +
+            (segment != nullptr && !segment->name.empty() ? " – " + EscapeHtml(segment->name) : "") +
             (r.use.is_organ            ? " (under the membrane)"
              : !r.use.material.empty() ? " (deformable)"
                                        : "");
@@ -105,7 +127,8 @@ std::string Page(const AnatomyImport& import, const LabelMap& map, const std::ve
   if (has_voxels)
     page +=
         "Before their triangles are reduced to triangles_max, surfaces stay within a voxel of the "
-        "boundary of the voxels. ";
+        "boundary of the voxels." +
+        overlaps + " ";
   return page + "Of an organ in several pieces only the largest is used.</p><p><img src=\"" + EscapeHtml(import.name) +
          ".png\" width=1280></p>";
 }
@@ -122,14 +145,29 @@ std::optional<Mat3d> FromAxes(std::string_view axes) {
   return m.determinant() == 1 ? std::optional(m) : std::nullopt;
 }
 
+/// A name for a file, of at most 31 characters.
+std::string FileName(const std::string& text) {
+  std::string name = text.substr(0, 31);
+  for (char& c : name) c = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' ? c : '_';
+  return name;
+}
+
 using Say = std::function<void(const std::string&)>;
 
 /// By the uses' names.
 std::map<std::string, TriangleMesh> SurfacesOfLabels(const AnatomyImport& import, const std::vector<LabelUse>& uses,
                                                      const Say& say, LabelMap* map,
                                                      std::map<int, std::size_t>* counts) {
-  *map = ReadLabelMap(import.labels);
+  std::set<int> used;
+  for (const LabelUse& use : uses) used.insert(use.label);
+  *map = ReadLabelMap(import.labels, used);
   say(PrintText("%d x %d x %d voxels", map->size[0], map->size[1], map->size[2]));
+  for (const Segment& s : map->segments) {
+    if (s.covered > 0) {
+      say(PrintText("segment %d (%s): %zu of %zu voxels also belong to a segment with a higher number, which counts",
+                    s.number, s.name.c_str(), s.covered, s.voxels));
+    }
+  }
   *counts = CountLabels(*map);
   std::vector<int> wanted;
   for (const LabelUse& use : uses) {
@@ -137,7 +175,8 @@ std::map<std::string, TriangleMesh> SurfacesOfLabels(const AnatomyImport& import
     if (count == counts->end() || count->second < kLeastVoxels) {
       throw InputError(import.map.string() + ": label " + std::to_string(use.label) + " (" + use.name + ") has " +
                        std::to_string(count == counts->end() ? 0 : count->second) + " voxels in " +
-                       import.labels.string() + "; valid: at least " + std::to_string(kLeastVoxels));
+                       import.labels.string() + "; valid: at least " + std::to_string(kLeastVoxels) +
+                       CoveredText(*map, use.label));
     }
     wanted.push_back(use.label);
   }
@@ -277,7 +316,7 @@ std::string SuggestLabelUses(const fs::path& labels) {
   struct Entry {
     std::string source, name;
     double size;
-    const char* unit;
+    std::string unit;
   };
   std::vector<Entry> entries;
   const bool is_folder = fs::is_directory(labels);
@@ -288,22 +327,31 @@ std::string SuggestLabelUses(const fs::path& labels) {
       if (!entry.is_regular_file() ||
           !std::set<std::string>{".stl", ".obj", ".off", ".ply", ".vtk", ".vtp"}.contains(extension))
         continue;
-      std::string name = entry.path().stem().string().substr(0, 31);
-      for (char& c : name) c = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' ? c : '_';
-      entries.push_back({"file: \"" + entry.path().filename().string() + "\"", name,
+      entries.push_back({"file: \"" + entry.path().filename().string() + "\"", FileName(entry.path().stem().string()),
                          static_cast<double>(ReadMesh(entry.path()).triangles.size()), "triangles"});
     }
     std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.source < b.source; });
   } else {
     const LabelMap map = ReadLabelMap(labels);
     const double voxel_ml = 1e-3 * std::abs(map.W_from_index.linear().determinant());
+    for (const Segment& s : map.segments) {
+      if (s.voxels == 0) continue;
+      const std::string number = std::to_string(s.number), name = FileName(s.name);
+      const bool has_name = name.find_first_not_of("_-") != std::string::npos;
+      const double covered_ml = static_cast<double>(s.covered) * voxel_ml;
+      entries.push_back(
+          {"label: " + number, has_name ? name : "label" + number, static_cast<double>(s.voxels) * voxel_ml,
+           s.covered == 0 ? "ml" : PrintText("ml, of it %.6g in segments with higher numbers", covered_ml)});
+    }
     for (const auto& [label, count] : CountLabels(map)) {
+      if (!map.segments.empty()) break;
       const std::string number = std::to_string(label);
       entries.push_back({"label: " + number, "label" + number, static_cast<double>(count) * voxel_ml, "ml"});
     }
   }
   if (entries.empty()) {
-    throw InputError(labels.string() + (is_folder ? ": holds no surface (.stl, .obj, .off, .ply, .vtk, .vtp)"
+    throw InputError(labels.string() + (is_folder ? ": holds no surface (.stl, .obj, .off, .ply, .vtk, .vtp). " +
+                                                        DicomFolderAdvice(labels)
                                                   : ": every voxel is 0, so nothing is labelled"));
   }
   const auto largest =
@@ -332,12 +380,13 @@ std::string SuggestLabelUses(const fs::path& labels) {
   int listed = 0;
   std::set<std::string> names;
   for (Entry& entry : entries) {
-    while (!names.insert(entry.name).second) entry.name = entry.name.substr(0, 29) + "_2";
+    const std::string base = entry.name.substr(0, 26);
+    for (int n = 2; !names.insert(entry.name).second; ++n) entry.name = base + "_" + std::to_string(n);
     const bool fits = entry.size >= least && listed < kMostLabels;
     listed += fits ? 1 : 0;
     text += std::string(fits ? "  - {" : "  # - {") + entry.source + ", name: " + entry.name +
             (&entry == &*largest ? ", organ: true" : ", role: other") +
-            PrintText("}   # %.6g %s\n", entry.size, entry.unit);
+            PrintText("}   # %.6g %s\n", entry.size, entry.unit.c_str());
   }
   return text;
 }

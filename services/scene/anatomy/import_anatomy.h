@@ -45,7 +45,7 @@ struct LabelReport {
 
 struct AnatomyImport {
   std::string name;              ///< Of the scene.
-  std::filesystem::path labels;  ///< A NIfTI file, or a folder of surfaces.
+  std::filesystem::path labels;  ///< A NIfTI or DICOM file, or a folder of surfaces.
   std::filesystem::path map;
   std::filesystem::path out;  ///< Folder to be made.
 };

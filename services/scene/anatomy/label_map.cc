@@ -8,11 +8,11 @@
 #include <string>
 
 #include "services/base/core/error.h"
+#include "services/scene/anatomy/dicom_outline.h"
+#include "services/scene/anatomy/dicom_segmentation.h"
 
 namespace fulcrum::scene {
 namespace {
-
-constexpr int kMostLabel = 65535;
 
 struct FreeImage {
   void operator()(nifti_image* image) const { nifti_image_free(image); }
@@ -58,17 +58,14 @@ void Take(const std::filesystem::path& file, const nifti_image& image, LabelMap*
   }
 }
 
-}  // namespace
-
-LabelMap ReadLabelMap(const std::filesystem::path& file) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error)) Refuse(file, "is no file");
+LabelMap ReadNifti(const std::filesystem::path& file) {
   nifti_set_debug_level(0);  // Its messages would go to standard error.
   Image image(nifti_image_read(file.c_str(), 0));
-  if (image == nullptr) Refuse(file, "is no NIfTI file (.nii, .nii.gz, .hdr with .img), or is cut short");
+  if (image == nullptr)
+    Refuse(file, "is no NIfTI file (.nii, .nii.gz, .hdr with .img) and no DICOM file, or is cut short");
   const std::int64_t size[3] = {image->nx, image->ny, image->nz};
   for (const std::int64_t n : size) {
-    if (n < 2 || n > 4096) {
+    if (n < kLeastVoxelsAlong || n > kMostVoxelsAlong) {
       Refuse(file, "is " + std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " + std::to_string(size[2]) +
                        " voxels; valid: 2 to 4096 either way");
     }
@@ -131,6 +128,15 @@ LabelMap ReadLabelMap(const std::filesystem::path& file) {
       Refuse(file, "has values of type " + std::to_string(image->datatype) + "; valid: whole or real numbers");
   }
   return map;
+}
+
+}  // namespace
+
+LabelMap ReadLabelMap(const std::filesystem::path& file, const std::set<int>& wanted) {
+  std::error_code error;
+  if (std::filesystem::is_directory(file, error)) Refuse(file, "is a folder, no label map. " + DicomFolderAdvice(file));
+  if (!std::filesystem::is_regular_file(file, error)) Refuse(file, "is no file");
+  return IsDicom(file) ? ReadDicomSegmentation(file, wanted) : ReadNifti(file);
 }
 
 std::map<int, std::size_t> CountLabels(const LabelMap& map) {

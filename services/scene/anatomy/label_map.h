@@ -6,11 +6,21 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "services/base/core/types.h"
 
 namespace fulcrum::scene {
+
+/// A segment of a DICOM segmentation, in which segments may overlap.
+struct Segment {
+  int number = 0;           ///< 1 to 65535, its label.
+  std::string name;         ///< SegmentLabel, printable UTF-8.
+  std::size_t voxels = 0;   ///< Of the segment itself.
+  std::size_t covered = 0;  ///< Of these: also of a segment with a higher number, which counts.
+};
 
 /// Label 0 is nothing. Voxel (i, j, k) has index i + nx (j + ny k) and its centre at W_from_index (i, j, k).
 struct LabelMap {
@@ -19,6 +29,7 @@ struct LabelMap {
   /// To the axes of frame W in millimetres: x to the patient's left, y cranial, z anterior. The origin is the
   /// scanner's.
   Eigen::Affine3d W_from_index = Eigen::Affine3d::Identity();
+  std::vector<Segment> segments;  ///< Of a DICOM segmentation, in the order of their numbers.
 
   [[nodiscard]] std::size_t Index(int i, int j, int k) const {
     return static_cast<std::size_t>(i) +
@@ -27,10 +38,13 @@ struct LabelMap {
 };
 
 inline constexpr std::size_t kMostVoxels = 1'000'000'000;
+inline constexpr int kMostLabel = 65535;
+inline constexpr int kLeastVoxelsAlong = 2, kMostVoxelsAlong = 4096;  ///< Of each axis.
 
-/// Reads a NIfTI-1 or -2 file (.nii, .nii.gz, .hdr with .img): one volume of whole numbers 0 to 65535, with a position
-/// in the patient (sform or qform). Throws InputError "file: reason; valid".
-LabelMap ReadLabelMap(const std::filesystem::path& file);
+/// Reads a file that begins as DICOM as ReadDicomSegmentation, any other as NIfTI-1 or -2 (.nii, .nii.gz, .hdr with
+/// .img): one volume of whole numbers 0 to 65535, with a position in the patient (sform or qform).
+/// @param wanted the segments that are used, in DICOM; empty: all. Throws InputError "file: reason; valid".
+LabelMap ReadLabelMap(const std::filesystem::path& file, const std::set<int>& wanted = {});
 
 /// Voxels of each label but 0.
 std::map<int, std::size_t> CountLabels(const LabelMap& map);
