@@ -122,6 +122,7 @@ std::unique_ptr<Target> MakeMeshFace();
 std::unique_ptr<Target> MakeMeshStl();
 std::unique_ptr<Target> MakeMeshObj();
 std::unique_ptr<Target> MakeMeshPly();
+std::unique_ptr<Target> MakeDicom();
 std::unique_ptr<Target> MakeRecording();
 std::unique_ptr<Target> MakeCheckpointFile();
 std::unique_ptr<Target> MakeCheckpointPhysics();
