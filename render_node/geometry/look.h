@@ -9,7 +9,7 @@
 namespace fulcrum::render {
 
 struct Look {
-  std::uint32_t patterns = 0;    ///< Seed of noise, lobules and vessels; 0: those of a session.
+  std::uint32_t patterns = 0;    ///< Seed of noise, lobules, vessels and loops of bowel; 0: those of a session.
   Vec3f light = Vec3f::Ones();   ///< Factor on the light that the camera gets: red, green, blue.
   Vec3f tissue = Vec3f::Ones();  ///< Factor on the light that tissue returns.
 };
