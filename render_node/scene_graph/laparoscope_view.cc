@@ -94,7 +94,7 @@ LaparoscopeView::Impl::Impl(const SceneView& view, const Look& given)
       atlas(view),
       atlas_texture(atlas),
       layers(view, scope),
-      surroundings(view, scope),
+      surroundings(view, scope, look),
       instruments(view),
       shadow(view),
       bleeding(view, serosa, kSerosaTexels, kSerosaPerMetre),

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <numbers>
 #include <osg/CullFace>
+#include <span>
 #include <vector>
 
+#include "render_node/geometry/background_anatomy.h"
 #include "render_node/geometry/surface.h"
 #include "render_node/scene_graph/mesh.h"
 #include "render_node/scene_graph/order.h"
@@ -17,26 +19,17 @@ namespace {
 
 using Float4 = std::array<float, 4>;
 
-/// Adds a sphere of tissue around everything, seen from inside, as background where the scene's surfaces end.
-void AppendCavity(const SceneView& scene, std::vector<Vec3f>* positions, std::vector<Vec3f>* normals,
+/// Adds the sphere of the cavity, seen from inside.
+void AppendCavity(const Cavity& cavity, std::vector<Vec3f>* positions, std::vector<Vec3f>* normals,
                   std::vector<Triangle>* triangles) {
   constexpr Index kMeridians = 48, kParallels = 24;
-  const Vec3f centre = scene.render.scope_target_W;
-  float radius = (scene.render.scope_tip_W - centre).norm();
-  for (const auto& points : {scene.rest_position, scene.static_vertices}) {
-    for (const Vec3f& p : points) {
-      radius = std::max(radius, (p - centre).norm());
-    }
-  }
-  radius += scene.breathing.amplitude_m;
-  radius *= 1.02f;  // Slightly larger, so that its facets also lie outside.
   const auto first = static_cast<Index>(positions->size());
   for (Index i = 0; i <= kParallels; ++i) {
     const float polar = std::numbers::pi_v<float> * static_cast<float>(i) / kParallels;
     for (Index k = 0; k <= kMeridians; ++k) {
       const float turn = 2 * std::numbers::pi_v<float> * static_cast<float>(k) / kMeridians;
       const Vec3f outward(std::sin(polar) * std::cos(turn), std::sin(polar) * std::sin(turn), std::cos(polar));
-      positions->push_back(centre + radius * outward);
+      positions->push_back(cavity.centre + cavity.radius * outward);
       normals->push_back(-outward);
     }
   }
@@ -47,6 +40,30 @@ void AppendCavity(const SceneView& scene, std::vector<Vec3f>* positions, std::ve
       triangles->push_back({a, a + 1, b + 1});
     }
   }
+}
+
+/// Place of a pattern on a surface around the cavity's middle: a stereographic projection, which changes the pattern's
+/// size but not its shape. Its one bad place lies behind the scope.
+Vec2f PlaceAround(const Vec3f& from_middle, const Laparoscope& scope) {
+  const Vec3f eye = scope.view.block<3, 3>(0, 0) * from_middle;
+  const float distance = eye.norm();
+  return 2 * distance * eye.head<2>() / std::max(0.05f * distance, distance - eye.z());
+}
+
+/// … and on any other one: an oblique projection, so that no anatomical plane is seen edge on.
+Vec2f PlaceAcross(const Vec3f& p) { return {p.x() + 0.41f * p.z(), p.y() - 0.57f * p.z()}; }
+
+Float4 DecorationColour(const BackgroundAnatomy::Vertex& vertex) {
+  const float light = 1 + 0.08f * vertex.shade;
+  if (vertex.fat > 0) return {0.86f * light, 0.50f * light, 0.19f * light, 1};
+  return {0.82f * light, (0.25f + 0.03f * vertex.shade) * light, (0.18f + 0.02f * vertex.shade) * light, 0.05f};
+}
+
+/// Whether a surface lies around the middle like a wall: it faces it nearly everywhere.
+bool LiesAround(std::span<const Vec3f> positions, std::span<const Vec3f> normals, const Vec3f& middle) {
+  float facing = 0;
+  for (std::size_t k = 0; k < positions.size(); ++k) facing += normals[k].dot((middle - positions[k]).normalized());
+  return facing > 0.75f * static_cast<float>(positions.size());
 }
 
 }  // namespace
@@ -67,11 +84,12 @@ std::array<float, 4> SurroundingColour(SurfaceRole role) {
   return {0.5f, 0.2f, 0.16f, 0.3f};
 }
 
-Surroundings::Surroundings(const SceneView& scene, const Laparoscope& scope) {
+Surroundings::Surroundings(const SceneView& scene, const Laparoscope& scope, const Look& look) {
   AddMask(scope);
-  AddSurfaces(scene, "surroundings", false);
+  const BackgroundAnatomy anatomy(scene, look.patterns);
+  AddSurfaces(scene, scope, anatomy, "surroundings", false);
   if (scene.breathing.amplitude_m > 0) {
-    AddSurfaces(scene, "breathing", true);
+    AddSurfaces(scene, scope, anatomy, "breathing", true);
   }
 }
 
@@ -96,22 +114,42 @@ void Surroundings::AddMask(const Laparoscope& scope) {
   fixed_->addDrawable(mask.geometry());
 }
 
-/// Adds the breathing surfaces, or all other fixed surfaces and the cavity.
-void Surroundings::AddSurfaces(const SceneView& scene, const char* name, bool breathing) {
+/// Adds the breathing surfaces, or all other fixed surfaces, the cavity and the decoration.
+void Surroundings::AddSurfaces(const SceneView& scene, const Laparoscope& scope, const BackgroundAnatomy& anatomy,
+                               const char* name, bool breathing) {
+  constexpr float kWet = 0.7f, kMatt = 0.02f;
   std::vector<Vec3f> positions, normals;
   std::vector<Float4> colours, coordinates;
   std::vector<Triangle> triangles;
+  const auto add = [&](std::size_t first, Float4 colour, float wet) {
+    const std::span<const Vec3f> of_it(positions.data() + first, positions.size() - first);
+    const Vec3f& middle = anatomy.cavity().centre;
+    const bool around = LiesAround(of_it, std::span(normals).subspan(first), middle);
+    for (std::size_t k = first; k < positions.size(); ++k) {
+      const Vec3f& p = positions[k];
+      const Vec2f place = around ? 0.5f * PlaceAround(p - middle, scope) : PlaceAcross(p);
+      coordinates.push_back({place.x(), place.y(), wet, anatomy.Openness(p, normals[k])});
+      colours.push_back(colour);
+    }
+  };
+  if (!breathing) {
+    // Near before far, so that what is hidden is not shaded: the decoration hides walls, its last parts the first ones.
+    for (const BackgroundAnatomy::Vertex& vertex : anatomy.vertices()) {
+      positions.push_back(vertex.p_W);
+      normals.push_back(vertex.normal);
+      colours.push_back(DecorationColour(vertex));
+      coordinates.push_back({vertex.place.x(), vertex.place.y(), vertex.fat > 0 ? 0.35f : 0.6f, vertex.openness});
+    }
+    triangles.assign(anatomy.triangles().rbegin(), anatomy.triangles().rend());
+  }
   for (const StaticSurface& surface : scene.static_surfaces) {
     if ((scene.breathing.amplitude_m > 0 && Breathes(surface.role)) != breathing) {
       continue;
     }
     const auto first = static_cast<Index>(positions.size());
-    for (Index k = 0; k < surface.vertex_count; ++k) {
-      const Vec3f& p = scene.static_vertices[surface.first_vertex + k];
-      positions.push_back(p);
-      coordinates.push_back({p.x(), p.y(), p.z(), 0});
-      colours.push_back(SurroundingColour(surface.role));
-    }
+    const auto vertices = scene.static_vertices.subspan(surface.first_vertex, surface.vertex_count);
+    positions.insert(positions.end(), vertices.begin(), vertices.end());
+    const std::size_t first_triangle = triangles.size();
     for (Index k = 0; k < surface.triangle_count; ++k) {
       Triangle t = scene.static_triangles[surface.first_triangle + k];
       for (Index& corner : t) {
@@ -119,15 +157,18 @@ void Surroundings::AddSurfaces(const SceneView& scene, const char* name, bool br
       }
       triangles.push_back(t);
     }
+    normals.resize(positions.size());
+    std::vector<Triangle> own(triangles.begin() + static_cast<std::ptrdiff_t>(first_triangle), triangles.end());
+    for (Triangle& t : own) {
+      for (Index& corner : t) corner -= first;
+    }
+    ComputeNormals(vertices, own, std::span(normals).subspan(first));
+    add(first, SurroundingColour(surface.role), kWet);
   }
-  normals.resize(positions.size());
-  ComputeNormals(positions, triangles, normals);
   if (!breathing) {
-    AppendCavity(scene, &positions, &normals, &triangles);
-  }
-  for (std::size_t k = coordinates.size(); k < positions.size(); ++k) {
-    coordinates.push_back({positions[k].x(), positions[k].y(), positions[k].z(), 1});
-    colours.push_back({0.60f, 0.11f, 0.085f, 0.4f});
+    const std::size_t first = positions.size();
+    AppendCavity(anatomy.cavity(), &positions, &normals, &triangles);
+    add(first, {0.60f, 0.11f, 0.085f, 0.4f}, kMatt);
   }
   Mesh mesh(name, false);
   mesh.state()->setAttributeAndModes(MakeProgram("surface.vert", "surroundings.frag"));
