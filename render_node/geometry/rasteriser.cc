@@ -21,7 +21,7 @@ Range Pixels(double low, double high, int count) {
 
 bool Pinhole::Shows(const Vec2d& pixel) const {
   return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < width && pixel.y() < height &&
-         std::hypot(pixel.x() - centre_x, pixel.y() - centre_y) < radius;
+         (pixel - Vec2d(centre_x, centre_y)).squaredNorm() < radius * radius;
 }
 
 Pinhole PinholeOf(const Laparoscope& scope, int width, int height) {
@@ -57,8 +57,6 @@ void Rasteriser::AddTriangle(std::int32_t surface, std::uint32_t index, const Ei
   }
   const auto w = pixels.row(2);
   if (w.maxCoeff() < camera_.near_m) return;
-  const double turn = pixels.determinant();
-  if (turn == 0 || (options.cull_back && turn < 0)) return;
   Vec2d low(0, 0), high(camera_.width, camera_.height);
   if (w.minCoeff() >= camera_.near_m) {
     const Eigen::Matrix<double, 2, 3> places = pixels.topRows<2>().array().rowwise() / w.array();
@@ -66,7 +64,11 @@ void Rasteriser::AddTriangle(std::int32_t surface, std::uint32_t index, const Ei
     high = places.rowwise().maxCoeff();
   }
   const Range rows = Pixels(low.y(), high.y(), camera_.height);
-  if (rows.begin >= rows.end) return;
+  // Most triangles of a fine mesh lie between the centres of the pixels.
+  if (const Range all = Pixels(low.x(), high.x(), camera_.width); rows.begin >= rows.end || all.begin >= all.end)
+    return;
+  const double turn = pixels.determinant();
+  if (turn == 0 || (options.cull_back && turn < 0)) return;
   const Eigen::Matrix3d inverse = pixels.inverse();
   const Vec3d step = inverse.col(0);
   for (int y = rows.begin; y < rows.end; ++y) {

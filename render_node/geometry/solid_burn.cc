@@ -50,15 +50,28 @@ AtlasRect BurnAtlas::Copy(const TemperaturePatch& patch) {
   return rect;
 }
 
-std::optional<BurnAtlas::Texel> BurnAtlas::At(Index chart, const Vec2f& material) const {
+BurnCharts::BurnCharts(const BurnAtlas& atlas, std::span<const Index> charts)
+    : intact_(atlas.intact()), boxes_(atlas.boxes().size()), first_(boxes_.size()) {
+  for (const Index chart : charts) {
+    const AtlasRect& box = boxes_[chart] = atlas.boxes()[chart];
+    first_[chart] = texels_.size();
+    if (box.empty()) continue;
+    const auto width = static_cast<std::size_t>(box.width);
+    texels_.resize(texels_.size() + width * static_cast<std::size_t>(box.height));
+    BurnAtlas::Texel* to = texels_.data() + first_[chart];
+    for (int y = box.y; y < box.y + box.height; ++y, to += width) {
+      std::memcpy(to, atlas.texels().data() + 4 * TexelIndex(box.x, y, atlas.width()), 4 * width);
+    }
+  }
+}
+
+std::optional<BurnAtlas::Texel> BurnCharts::At(Index chart, const Vec2f& material) const {
   if (chart >= boxes_.size()) return std::nullopt;
   const AtlasRect& box = boxes_[chart];
-  const int x = static_cast<int>(std::floor(material.x() / kSolidCell_m));
-  const int y = static_cast<int>(std::floor(material.y() / kSolidCell_m));
-  if (x < box.x || y < box.y || x >= box.x + box.width || y >= box.y + box.height) return std::nullopt;
-  Texel texel;
-  std::memcpy(texel.data(), texels_.data() + 4 * TexelIndex(x, y, width_), 4);
-  return texel;
+  const int x = static_cast<int>(std::floor(material.x() / kSolidCell_m)) - box.x;
+  const int y = static_cast<int>(std::floor(material.y() / kSolidCell_m)) - box.y;
+  if (x < 0 || y < 0 || x >= box.width || y >= box.height) return std::nullopt;
+  return texels_[first_[chart] + TexelIndex(x, y, box.width)];
 }
 
 AtlasRect SolidBurn::Apply(const TemperaturePatch& patch) {

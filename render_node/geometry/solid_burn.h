@@ -17,7 +17,7 @@
 
 namespace fulcrum::render {
 
-/// Thermal state of the solids' charts, four bytes a texel as in a TemperaturePatch. A copy keeps that of its moment.
+/// Thermal state of the solids' charts, four bytes a texel as in a TemperaturePatch.
 class BurnAtlas {
  public:
   using Texel = std::array<std::uint8_t, 4>;
@@ -30,8 +30,6 @@ class BurnAtlas {
   /// @pre the patch has the right size and begins within 4096 x 4096 texels.
   AtlasRect Copy(const TemperaturePatch& patch);
 
-  /// Texel of a chart at (s, t) [m]; no value outside the chart's box, where those of other charts lie.
-  [[nodiscard]] std::optional<Texel> At(Index chart, const Vec2f& material) const;
   /// What texels are before the first patch.
   [[nodiscard]] const Texel& intact() const { return intact_; }
 
@@ -47,6 +45,25 @@ class BurnAtlas {
   Texel intact_{};
   std::vector<std::uint8_t> texels_;
   std::vector<AtlasRect> boxes_;
+};
+
+/// The texels of some charts, as they were when this was made.
+class BurnCharts {
+ public:
+  BurnCharts() = default;
+  /// @param charts numbers of charts of the atlas, each once.
+  BurnCharts(const BurnAtlas& atlas, std::span<const Index> charts);
+
+  /// Texel at (s, t) [m]; no value outside the chart's box, or of another chart.
+  [[nodiscard]] std::optional<BurnAtlas::Texel> At(Index chart, const Vec2f& material) const;
+  /// What texels are before the first patch.
+  [[nodiscard]] const BurnAtlas::Texel& intact() const { return intact_; }
+
+ private:
+  BurnAtlas::Texel intact_{};
+  std::vector<AtlasRect> boxes_;    // By number of the chart; empty: not one of these.
+  std::vector<std::size_t> first_;  // By number of the chart: its first texel.
+  std::vector<BurnAtlas::Texel> texels_;
 };
 
 class SolidBurn {

@@ -9,6 +9,7 @@
 #include <osg/Geometry>
 #include <osg/MatrixTransform>
 #include <osg/NodeVisitor>
+#include <set>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -25,11 +26,13 @@ constexpr std::array<std::string_view, 1> kBurns{"burn"};
 class Collector final : public osg::NodeVisitor {
  public:
   /// @param names of the surfaces that are collected; they must outlive it.
-  explicit Collector(std::span<const std::string_view> names)
-      : osg::NodeVisitor(TRAVERSE_ALL_CHILDREN), names_(names) {}
+  explicit Collector(std::span<const std::string_view> names) : osg::NodeVisitor(TRAVERSE_ALL_CHILDREN), names_(names) {
+    setNodeMaskOverride(~0u);  // Cameras rest when they have drawn.
+  }
 
   void apply(osg::Camera& camera) override { traverse(camera); }  // Its matrix is no place of its content.
   void apply(osg::MatrixTransform& transform) override {
+    if (transform.getNodeMask() == 0) return;  // An instrument that is not there.
     const osg::Matrix before = place_;
     const int tool = tool_;
     place_ = transform.getMatrix() * place_;
@@ -40,6 +43,8 @@ class Collector final : public osg::NodeVisitor {
   }
   void apply(osg::Geometry& geometry) override {
     if (std::find(names_.begin(), names_.end(), geometry.getName()) == names_.end()) return;
+    // The fixed surroundings are there for two backgrounds; the jaws of an instrument share a mesh.
+    if (tool_ < 0 && !seen_.insert(&geometry).second) return;
     DrawnSurface surface;
     surface.name = geometry.getName();
     surface.tool = tool_;
@@ -78,6 +83,7 @@ class Collector final : public osg::NodeVisitor {
   }
 
   std::span<const std::string_view> names_;
+  std::set<const osg::Geometry*> seen_;
   osg::Matrix place_;
   int tool_ = -1;
   std::map<std::pair<std::string, int>, int> parts_;

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <osg/Geode>
 #include <vector>
 
 #include "render_node/offscreen/framebuffer.h"
@@ -87,13 +86,17 @@ Optics::Optics(const Laparoscope& scope, int width, int height, osg::Node* backg
   osg::StateSet* state = node_->getOrCreateStateSet();
   state->addUniform(circle_radius_);
   state->addUniform(picture_centre_);
-  background_ = MakeTarget(0, background);
-  background_.camera->setClearColor(osg::Vec4(0.12f, 0.035f, 0.03f, 1));
+  for (Background& each : backgrounds_) {
+    each.target = MakeTarget(0, background);
+    each.target.camera->setClearColor(osg::Vec4(0.12f, 0.035f, 0.03f, 1));
+  }
   scene_ = MakeTarget(1, scene);
   scene_.camera->setClearMask(0);
-  const osg::ref_ptr<osg::Geode> copy = new osg::Geode;
-  copy->addDrawable(new CopyTarget(background_, scene_));
-  scene_.camera->addChild(copy);
+  for (Background& each : backgrounds_) {
+    each.copy = new osg::Geode;
+    each.copy->addDrawable(new CopyTarget(each.target, scene_));
+    scene_.camera->addChild(each.copy);
+  }
   AddField();
   SetLight(Vec3f::Ones());
   SetScope(scope);
@@ -104,7 +107,9 @@ void Optics::SetSize(const Laparoscope& scope, int width, int height) {
   scope_ = scope;
   width_ = width;
   height_ = height;
-  for (const Target& target : {background_, scene_}) target.camera->setProjectionMatrix(ToOsg(scope.projection));
+  scene_.camera->setProjectionMatrix(ToOsg(scope.projection));
+  backgrounds_[used_].target.camera->setProjectionMatrix(ToOsg(scope.projection));
+  backgrounds_[used_].from = scope;
   ResizeTextures();
 }
 
@@ -117,7 +122,7 @@ void Optics::SetMostScale(float most) {
 int Optics::Texels(int pixels) const { return static_cast<int>(std::lround(most_ * static_cast<float>(pixels))); }
 
 void Optics::ResizeTextures() {
-  for (const Target& target : {background_, scene_}) {
+  for (const Target& target : {backgrounds_[0].target, backgrounds_[1].target, scene_}) {
     for (osg::Texture2D* texture : {target.colour.get(), target.depth.get()}) {
       texture->setTextureSize(Texels(width_), Texels(height_));
       texture->dirtyTextureObject();
@@ -199,7 +204,7 @@ void Optics::UseScale() {
     return std::clamp(static_cast<int>(std::lround(scale_ * static_cast<float>(full))), 1, Texels(full));
   };
   const int width = pixels(width_), height = pixels(height_);
-  background_.camera->setViewport(0, 0, width, height);
+  for (const Background& each : backgrounds_) each.target.camera->setViewport(0, 0, width, height);
   scene_.camera->setViewport(0, 0, width, height);
   const osg::Vec2 share(static_cast<float>(width) / static_cast<float>(width_),
                         static_cast<float>(height) / static_cast<float>(height_));
@@ -212,15 +217,38 @@ void Optics::UseScale() {
   texture_most_->set(used - texel * 0.5f);
   pixel_->set(osg::Vec2(used.x() / static_cast<float>(width_), used.y() / static_cast<float>(height_)));
   UseLens();
-  BackgroundChanged();
+  BackgroundsChanged();
 }
 
 void Optics::SetScope(const Laparoscope& scope) {
-  for (osg::Camera* camera : {background_.camera.get(), scene_.camera.get()}) {
-    camera->setViewMatrix(ToOsg(scope.view));
-    camera->setProjectionMatrix(ToOsg(scope.projection));
+  const osg::Matrix view = ToOsg(scope.view), projection = ToOsg(scope.projection);
+  scene_.camera->setViewMatrix(view);
+  scene_.camera->setProjectionMatrix(projection);
+  SceneChanged();
+  for (const std::size_t k : {used_, 1 - used_}) {
+    const std::optional<Laparoscope>& from = backgrounds_[k].from;
+    if (from && from->view == scope.view && from->projection == scope.projection &&
+        from->light_power == scope.light_power) {
+      return Use(k);
+    }
   }
-  BackgroundChanged();
+  Use(1 - used_);
+  Background& next = backgrounds_[used_];
+  next.target.camera->setViewMatrix(view);
+  next.target.camera->setProjectionMatrix(projection);
+  next.target.camera->setNodeMask(~0u);
+  next.from = scope;
+}
+
+void Optics::Use(std::size_t background) {
+  Background &before = backgrounds_[used_], &now = backgrounds_[background];
+  if (background != used_ && before.target.camera->getNodeMask() != 0) {
+    before.from.reset();  // It has not been drawn.
+    before.target.camera->setNodeMask(0);
+  }
+  before.copy->setNodeMask(0);
+  now.copy->setNodeMask(~0u);
+  used_ = background;
 }
 
 void Optics::SetSoil(float soil) {
@@ -246,8 +274,11 @@ void Optics::UseLens() {
 
 void Optics::SceneChanged() { scene_.camera->setNodeMask(~0u); }
 
-void Optics::BackgroundChanged() {
-  background_.camera->setNodeMask(~0u);
+void Optics::BackgroundsChanged() {
+  Background &now = backgrounds_[used_], &other = backgrounds_[1 - used_];
+  now.target.camera->setNodeMask(~0u);
+  other.target.camera->setNodeMask(0);
+  other.from.reset();
   SceneChanged();
 }
 

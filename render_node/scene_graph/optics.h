@@ -1,9 +1,12 @@
 // Drawing of the scene into the picture: the scene is drawn into a texture at the resolution of the quality setting,
-// and its round field is scaled into the picture. The static background is drawn once, into a texture of its own, and
-// copied with its depth before each picture of the scene.
+// and its round field is scaled into the picture. The static background is drawn once for a place of the camera, into a
+// texture of its own, and copied with its depth before each picture of the scene.
 #pragma once
 
+#include <array>
+#include <optional>
 #include <osg/Camera>
+#include <osg/Geode>
 #include <osg/Program>
 #include <osg/Texture2D>
 
@@ -22,7 +25,8 @@ class Optics {
   void SetScale(float scale);
   /// Largest scale, 1 at first: the textures have as many pixels.
   void SetMostScale(float most);
-  /// Moves the camera; the size of the picture does not change.
+  /// Moves the camera; the size of the picture does not change. The backgrounds of the last two places are kept, for
+  /// pictures of two cameras in turn.
   void SetScope(const Laparoscope& scope);
   /// 0: clear lens … 1: nothing to be seen (services/base/core/lens.h).
   void SetSoil(float soil);
@@ -39,9 +43,15 @@ class Optics {
     osg::ref_ptr<osg::Texture2D> colour, depth;
     osg::ref_ptr<osg::Camera> camera;
   };
+  struct Background {
+    Target target;
+    osg::ref_ptr<osg::Geode> copy;    // Into the scene.
+    std::optional<Laparoscope> from;  // None: nothing has been drawn, nor will be in the next picture.
+  };
   class CopyTarget;
   Target MakeTarget(int order, osg::Node* content);
-  void BackgroundChanged();
+  void BackgroundsChanged();
+  void Use(std::size_t background);
   void AddField();
   void UseScale();
   void UseLens();
@@ -57,7 +67,9 @@ class Optics {
       smoke_;
   osg::ref_ptr<osg::Program> clear_lens_, smooth_lens_, soiled_lens_;
   osg::ref_ptr<osg::StateSet> field_state_;
-  Target background_, scene_;
+  std::array<Background, 2> backgrounds_;
+  std::size_t used_ = 0;  // Of them.
+  Target scene_;
 };
 
 }  // namespace fulcrum::render

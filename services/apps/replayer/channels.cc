@@ -1,12 +1,10 @@
 #include "services/apps/replayer/channels.h"
 
-#include <png.h>
-
-#include <csetjmp>
 #include <cstdio>
 #include <memory>
 #include <utility>
 
+#include "services/apps/replayer/png_file.h"
 #include "services/base/core/error.h"
 
 namespace fulcrum::replay {
@@ -18,39 +16,6 @@ struct CloseFile {
   void operator()(std::FILE* file) const { (void)std::fclose(file); }
 };
 
-/// libpng reports failures by longjmp: no object with a destructor may be made between.
-bool Encode(std::FILE* file, const Channel& channel, const std::uint8_t* rows, std::size_t row_bytes) {
-  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
-  png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
-  if (info == nullptr || setjmp(png_jmpbuf(png)) != 0) {
-    png_destroy_write_struct(&png, &info);
-    return false;
-  }
-  png_init_io(png, file);
-  // A quarter of the default level's time for a tenth more bytes.
-  png_set_compression_level(png, 1);
-  png_set_filter(png, 0, PNG_FILTER_SUB);
-  png_set_IHDR(png, info, static_cast<png_uint_32>(channel.width), static_cast<png_uint_32>(channel.height),
-               channel.bits, channel.samples == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
-               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-  png_write_info(png, info);
-  for (int y = 0; y < channel.height; ++y) png_write_row(png, rows + static_cast<std::size_t>(y) * row_bytes);
-  png_write_end(png, info);
-  png_destroy_write_struct(&png, &info);
-  return true;
-}
-
-/// Values as the file has them: the high byte first.
-std::vector<std::uint8_t> Bytes(const Channel& channel) {
-  std::vector<std::uint8_t> bytes;
-  bytes.reserve(channel.values.size() * static_cast<std::size_t>(channel.bits) / 8);
-  for (const std::uint16_t value : channel.values) {
-    if (channel.bits == 16) bytes.push_back(static_cast<std::uint8_t>(value >> 8));
-    bytes.push_back(static_cast<std::uint8_t>(value));
-  }
-  return bytes;
-}
-
 }  // namespace
 
 Channel::Channel(int columns, int rows, int bits_of_each, int samples_of_each)
@@ -60,11 +25,6 @@ Channel::Channel(int columns, int rows, int bits_of_each, int samples_of_each)
       samples(samples_of_each),
       values(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows) *
              static_cast<std::size_t>(samples_of_each)) {}
-
-std::uint16_t& Channel::At(int x, int y, int sample) {
-  const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
-  return values[pixel * static_cast<std::size_t>(samples) + static_cast<std::size_t>(sample)];
-}
 
 Channel FromBitmap(const render::Bitmap& picture) {
   Channel channel(picture.width, picture.height, 8, 3);
@@ -77,11 +37,10 @@ Channel FromBitmap(const render::Bitmap& picture) {
 }
 
 void WriteChannel(const Channel& channel, const std::filesystem::path& file) {
-  const std::vector<std::uint8_t> bytes = Bytes(channel);
+  const std::vector<std::uint8_t> bytes = PngOf(channel);
   const std::unique_ptr<std::FILE, CloseFile> out(std::fopen(file.c_str(), "wbe"));
   const bool written =
-      out && Encode(out.get(), channel, bytes.data(), bytes.size() / static_cast<std::size_t>(channel.height)) &&
-      std::fflush(out.get()) == 0;
+      out && std::fwrite(bytes.data(), 1, bytes.size(), out.get()) == bytes.size() && std::fflush(out.get()) == 0;
   if (!written) throw InputError(file.string() + ": cannot be written; is the disk full?");
 }
 

@@ -22,7 +22,10 @@ struct Channel {
   std::vector<std::uint16_t> values;  ///< Row by row from the top.
 
   Channel(int columns, int rows, int bits_of_each, int samples_of_each);
-  [[nodiscard]] std::uint16_t& At(int x, int y, int sample = 0);
+  [[nodiscard]] std::uint16_t& At(int x, int y, int sample = 0) {
+    const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+    return values[pixel * static_cast<std::size_t>(samples) + static_cast<std::size_t>(sample)];
+  }
 };
 
 [[nodiscard]] Channel FromBitmap(const render::Bitmap& picture);

@@ -1,34 +1,12 @@
 #include "services/apps/replayer/coco.h"
 
 #include <algorithm>
-#include <map>
 
 #include "services/apps/replayer/report_format.h"
 #include "services/base/core/error.h"
 
 namespace fulcrum::replay {
 namespace {
-
-/// Pixels, half open, from the upper left.
-struct Box {
-  int left, top, right, bottom;
-  std::uint64_t area = 0;
-};
-
-std::map<int, Box> Boxes(const Channel& instances) {
-  std::map<int, Box> boxes;
-  for (int y = 0; y < instances.height; ++y) {
-    for (int x = 0; x < instances.width; ++x) {
-      const int instance = instances.values[static_cast<std::size_t>(y) * static_cast<std::size_t>(instances.width) +
-                                            static_cast<std::size_t>(x)];
-      if (instance == 0) continue;
-      Box& box = boxes.try_emplace(instance, Box{x, y, x + 1, y + 1}).first->second;
-      box = {std::min(box.left, x), std::min(box.top, y), std::max(box.right, x + 1), std::max(box.bottom, y + 1),
-             box.area + 1};
-    }
-  }
-  return boxes;
-}
 
 std::string Joined(const std::vector<std::uint32_t>& values) {
   std::string text;
@@ -38,19 +16,40 @@ std::string Joined(const std::vector<std::uint32_t>& values) {
 
 }  // namespace
 
-std::vector<std::uint32_t> RunLengths(const Channel& instances, int instance) {
-  std::vector<std::uint32_t> runs{0};
-  bool inside = false;
-  for (int x = 0; x < instances.width; ++x) {
-    for (int y = 0; y < instances.height; ++y) {
-      const bool is = instances.values[static_cast<std::size_t>(y) * static_cast<std::size_t>(instances.width) +
-                                       static_cast<std::size_t>(x)] == instance;
-      if (is != inside) runs.push_back(0);
-      inside = is;
-      ++runs.back();
+std::map<int, InstanceMask> InstanceMasks(const Channel& instances) {
+  const auto width = static_cast<std::size_t>(instances.width), height = static_cast<std::size_t>(instances.height);
+  std::map<int, InstanceMask> masks;
+  std::map<int, std::size_t> ends;  // Of the last run of each instance.
+  for (std::size_t x = 0; x < width; ++x) {
+    for (std::size_t y = 0; y < height;) {
+      const std::uint16_t instance = instances.values[y * width + x];
+      const std::size_t top = y;
+      while (++y < height && instances.values[y * width + x] == instance) {
+      }
+      if (instance == 0) continue;
+      const int left = static_cast<int>(x), low = static_cast<int>(top), high = static_cast<int>(y);
+      InstanceMask& mask = masks.try_emplace(instance, InstanceMask{left, low, left + 1, high}).first->second;
+      mask.top = std::min(mask.top, low);
+      mask.right = left + 1;
+      mask.bottom = std::max(mask.bottom, high);
+      mask.area += y - top;
+      // A run that ends at the foot of a column goes on at the head of the next one.
+      std::size_t& end = ends[instance];
+      const std::size_t begin = x * height + top, before = begin - end;
+      const auto length = static_cast<std::uint32_t>(y - top);
+      if (before == 0 && !mask.runs.empty()) {
+        mask.runs.back() += length;
+      } else {
+        mask.runs.insert(mask.runs.end(), {static_cast<std::uint32_t>(before), length});
+      }
+      end = begin + length;
     }
   }
-  return runs;
+  for (auto& [instance, mask] : masks) {
+    if (const std::size_t rest = width * height - ends[instance]; rest > 0)
+      mask.runs.push_back(static_cast<std::uint32_t>(rest));
+  }
+  return masks;
 }
 
 CocoFile::CocoFile(const std::filesystem::path& file) : file_(file), out_(file) {
@@ -64,22 +63,19 @@ CocoFile::CocoFile(const std::filesystem::path& file) : file_(file), out_(file) 
   if (!out_) throw InputError(file.string() + ": cannot be written");
 }
 
-void CocoFile::Add(int image, const std::string& file_name, const Truth& truth) {
-  const int width = truth.camera().width, height = truth.camera().height;
+void CocoFile::Add(int image, const std::string& file_name, const Channel& instances, const Truth& truth) {
+  const int width = instances.width, height = instances.height;
   images_ += Format("%s\n  {\"id\": %d, \"file_name\": \"%s\", \"width\": %d, \"height\": %d}",
                     images_.empty() ? "" : ",", image, file_name.c_str(), width, height);
-  const Channel instances = truth.Instances(), classes = truth.Classes();
-  std::map<int, int> class_of;
-  for (std::size_t i = 0; i < instances.values.size(); ++i) class_of[instances.values[i]] = classes.values[i];
-  for (const auto& [instance, box] : Boxes(instances)) {
+  for (const auto& [instance, mask] : InstanceMasks(instances)) {
     out_ << (annotations_ > 0 ? "," : "") << "\n  "
          << Format(
                 "{\"id\": %llu, \"image_id\": %d, \"category_id\": %d, \"instance\": %d, \"iscrowd\": 0, "
                 "\"bbox\": [%d, %d, %d, %d], \"area\": %llu, \"segmentation\": {\"size\": [%d, %d], \"counts\": [",
-                static_cast<unsigned long long>(annotations_ + 1), image, class_of[instance], instance, box.left,
-                box.top, box.right - box.left, box.bottom - box.top, static_cast<unsigned long long>(box.area), height,
-                width)
-         << Joined(RunLengths(instances, instance)) << "]}}";
+                static_cast<unsigned long long>(annotations_ + 1), image, static_cast<int>(truth.ClassOf(instance)),
+                instance, mask.left, mask.top, mask.right - mask.left, mask.bottom - mask.top,
+                static_cast<unsigned long long>(mask.area), height, width)
+         << Joined(mask.runs) << "]}}";
     ++annotations_;
   }
 }

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -11,8 +12,16 @@
 
 namespace fulcrum::replay {
 
-/// Lengths of alternating runs of 0 and 1 in a mask, column by column from the upper left: COCO's uncompressed form.
-[[nodiscard]] std::vector<std::uint32_t> RunLengths(const Channel& instances, int instance);
+/// Where an instance is in an image.
+struct InstanceMask {
+  int left, top, right, bottom;  ///< Box around it [pixels], half open, from the upper left.
+  std::uint64_t area = 0;        ///< [pixels]
+  /// Lengths of alternating runs of 0 and 1, column by column from the upper left: COCO's uncompressed form.
+  std::vector<std::uint32_t> runs{};
+};
+
+/// Of all instances of an image but 0.
+[[nodiscard]] std::map<int, InstanceMask> InstanceMasks(const Channel& instances);
 
 class CocoFile {
  public:
@@ -20,7 +29,7 @@ class CocoFile {
   explicit CocoFile(const std::filesystem::path& file);
 
   /// Adds an image and all instances that it shows. `file_name` is relative to the annotations' folder.
-  void Add(int image, const std::string& file_name, const Truth& truth);
+  void Add(int image, const std::string& file_name, const Channel& instances, const Truth& truth);
   /// Completes the file. Throws InputError.
   void Finish();
 

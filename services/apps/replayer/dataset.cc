@@ -114,12 +114,13 @@ class DatasetMaker {
     Write("depth", i, truth->Depth());
     Write("normal", i, truth->Normals());
     Write("class", i, truth->Classes());
-    Write("instance", i, truth->Instances());
+    Channel instances = truth->Instances();
+    coco_->Add(static_cast<int>(i), "left/" + FileName(i), instances, *truth);
+    Write("instance", i, std::move(instances));
     Write("temperature", i, truth->temperature());
     Write("damage", i, truth->damage());
     Write("water", i, truth->water());
     if (before_) Write("flow", i - 1, before_->FlowTo(*truth));
-    coco_->Add(static_cast<int>(i), "left/" + FileName(i), *truth);
     frames_ << FrameText(i, frame.time_s, frame.state, scene_, *truth) << '\n';
     before_ = std::move(truth);
   }

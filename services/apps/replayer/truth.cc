@@ -39,17 +39,48 @@ std::uint16_t Rounded(double value, double most) {
   return static_cast<std::uint16_t>(std::floor(std::clamp(value, 0.0, most) + 0.5));
 }
 
+TruthClass ClassOfTool(ToolKind kind) {
+  return kind == ToolKind::kHook       ? TruthClass::kHook
+         : kind == ToolKind::kScissors ? TruthClass::kScissors
+                                       : TruthClass::kGrasper;
+}
+
 TruthClass ClassOfSurface(const DrawnSurface& surface, const std::array<ToolKind, kMaxTools>& kinds) {
-  if (surface.tool >= 0) {
-    const ToolKind kind = kinds[static_cast<std::size_t>(surface.tool)];
-    return kind == ToolKind::kHook       ? TruthClass::kHook
-           : kind == ToolKind::kScissors ? TruthClass::kScissors
-                                         : TruthClass::kGrasper;
-  }
+  if (surface.tool >= 0) return ClassOfTool(kinds[static_cast<std::size_t>(surface.tool)]);
   if (surface.name == "rectum") return TruthClass::kRectum;
   if (surface.name == "organ") return TruthClass::kOrgan;
   if (surface.name == "fat") return TruthClass::kFat;
   return surface.name == "membrane" ? TruthClass::kMembrane : TruthClass::kSurroundings;
+}
+
+/// A value of a triangle, made once for neighbours in a row that show the same one.
+template <class Value>
+class OfTriangle {
+ public:
+  template <class Make>
+  const Value& At(const Hit& hit, const Make& make) {
+    if (hit.surface != surface_ || hit.triangle != triangle_) value_ = make(hit);
+    surface_ = hit.surface;
+    triangle_ = hit.triangle;
+    return value_;
+  }
+
+ private:
+  std::int32_t surface_ = -1;
+  std::uint32_t triangle_ = 0;
+  Value value_{};
+};
+
+/// Charts of a burn's corners, each once.
+std::vector<Index> ChartsOf(const DrawnSurface& burn) {
+  std::vector<Index> charts;
+  for (const auto& corner : burn.coordinates) {
+    const auto chart = static_cast<Index>(std::lround(corner[2]));
+    if (charts.empty() || charts.back() != chart) charts.push_back(chart);
+  }
+  std::sort(charts.begin(), charts.end());
+  charts.erase(std::unique(charts.begin(), charts.end()), charts.end());
+  return charts;
 }
 
 }  // namespace
@@ -71,11 +102,12 @@ Moment::Moment(render::LaparoscopeView* view, const render::Laparoscope& from, c
       atlas(view->atlas()),
       burn(render::DrawnBurn(view->root())) {
   for (std::size_t k = 0; k < kMaxTools; ++k) kinds[k] = scene.tools[k].kind;
-  if (burn) burn_atlas = view->burn_atlas();
+  if (burn) burnt = render::BurnCharts(view->burn_atlas(), ChartsOf(*burn));
 }
 
 Truth::Truth(Moment moment)
     : view_(moment.scope.view.cast<double>()),
+      kinds_(moment.kinds),
       surfaces_(std::move(moment.surfaces)),
       raster_(render::PinholeOf(moment.scope, moment.width, moment.height)),
       temperature_(moment.width, moment.height, 16, 1),
@@ -83,11 +115,11 @@ Truth::Truth(Moment moment)
       water_(moment.width, moment.height, 8, 1) {
   for (std::size_t i = 0; i < surfaces_.size(); ++i) {
     index_[KeyOf(surfaces_[i])] = i;
-    classes_.push_back(ClassOfSurface(surfaces_[i], moment.kinds));
+    classes_.push_back(ClassOfSurface(surfaces_[i], kinds_));
   }
   Draw(moment.atlas);
   TakeHeat(moment.atlas);
-  if (moment.burn) TakeHeatOfSolids(*moment.burn, moment.burn_atlas);
+  if (moment.burn) TakeHeatOfSolids(*moment.burn, moment.burnt);
 }
 
 std::vector<Vec3d> Truth::InCamera(const DrawnSurface& surface) const {
@@ -133,10 +165,10 @@ void Truth::TakeHeat(const render::Atlas& atlas) {
   }
 }
 
-void Truth::TakeHeatOfSolids(const DrawnSurface& burn, const render::BurnAtlas& atlas) {
+void Truth::TakeHeatOfSolids(const DrawnSurface& burn, const render::BurnCharts& charts) {
   const auto texel_at = [&](std::uint32_t triangle, float b1, float b2) {
     const Corner at = Between(burn.coordinates, burn.triangles[triangle], {0, triangle, b1, b2, 0});
-    return atlas.At(static_cast<Index>(std::lround(at[2])), {at[0], at[1]});
+    return charts.At(static_cast<Index>(std::lround(at[2])), {at[0], at[1]});
   };
   render::Rasteriser raster(camera());
   const std::vector<Vec3d> positions = InCamera(burn);
@@ -144,9 +176,9 @@ void Truth::TakeHeatOfSolids(const DrawnSurface& burn, const render::BurnAtlas& 
   // A triangle over the border of two charts is there for each. Where both have texels, those that have changed show,
   // as in the picture: of two equal depths the first stays.
   for (const bool changed_only : {true, false}) {
-    options.shown = [&texel_at, &atlas, changed_only](std::uint32_t triangle, float b1, float b2) {
+    options.shown = [&texel_at, &charts, changed_only](std::uint32_t triangle, float b1, float b2) {
       const auto texel = texel_at(triangle, b1, b2);
-      return texel && (!changed_only || *texel != atlas.intact());
+      return texel && (!changed_only || *texel != charts.intact());
     };
     raster.Add(0, positions, burn.triangles, options);
   }
@@ -211,6 +243,12 @@ int Truth::InstanceOf(const Hit& hit) const {
   return what == TruthClass::kOrgan ? kFirstOrganInstance + surface.part : static_cast<int>(what);
 }
 
+TruthClass Truth::ClassOf(int instance) const {
+  if (instance >= kFirstOrganInstance) return TruthClass::kOrgan;
+  if (instance < kFirstToolInstance) return static_cast<TruthClass>(instance);
+  return ClassOfTool(kinds_[static_cast<std::size_t>(instance - kFirstToolInstance)]);
+}
+
 Vec3d Truth::PointOf(const Hit& hit) const {
   const DrawnSurface& surface = surfaces_[static_cast<std::size_t>(hit.surface)];
   return Between(surface.positions_W, surface.triangles[hit.triangle], hit);
@@ -256,8 +294,9 @@ Channel Truth::Depth() const {
 Channel Truth::Normals() const {
   const Eigen::Matrix3d turn = world_to_camera().topLeftCorner<3, 3>();
   const Vec3d eye_W = -view_.topLeftCorner<3, 3>().transpose() * view_.topRightCorner<3, 1>();
+  OfTriangle<Vec3d> normals;
   return Make(8, 3, [&](const Hit& hit, int, int, std::uint16_t* pixel) {
-    Vec3d normal = NormalOf(hit);
+    Vec3d normal = normals.At(hit, [this](const Hit& first) { return NormalOf(first); });
     if (normal.dot(PointOf(hit) - eye_W) > 0) normal = -normal;
     const Vec3d coded = 127.5 * (turn * normal + Vec3d::Ones());
     for (int k = 0; k < 3; ++k) pixel[k] = Rounded(coded[k], 255);
@@ -293,9 +332,9 @@ double Truth::Footprint(const Hit& hit) const {
   return static_cast<double>(hit.depth_m) / camera().focal / std::max(kFlattest, facing);
 }
 
+template <class SamePlace>
 FlowState Truth::StateOf(const Vec2d& place, double depth_m, const DrawnSurface* surface,
-                         const std::optional<Vec2d>& material, double footprint_m) const {
-  constexpr double kSamePlace = 3;  // Pixels: the nearest pixel is up to 0.7 away, on a sheet that may be stretched.
+                         const std::optional<Vec2d>& material, const SamePlace& is_same) const {
   if (!camera().Shows(place)) return FlowState::kHidden;
   const Hit& hit = raster_.At(static_cast<int>(place.x()), static_cast<int>(place.y()));
   const bool self = hit.any() && &surfaces_[static_cast<std::size_t>(hit.surface)] == surface;
@@ -303,15 +342,16 @@ FlowState Truth::StateOf(const Vec2d& place, double depth_m, const DrawnSurface*
   if (!material) return FlowState::kVisible;
   // Of a sheet that has been cut or burnt away meanwhile nothing is there.
   const auto there = MaterialOf(hit);
-  const bool same = self && there && (*there - *material).norm() < kSamePlace * footprint_m;
-  return same ? FlowState::kVisible : FlowState::kNone;
+  return self && there && is_same((*there - *material).norm()) ? FlowState::kVisible : FlowState::kNone;
 }
 
 Channel Truth::FlowTo(const Truth& next) const {
+  constexpr double kSamePlace = 3;  // Pixels: the nearest pixel is up to 0.7 away, on a sheet that may be stretched.
   const std::vector<const DrawnSurface*> surfaces = SurfacesIn(next);
+  OfTriangle<bool> stays;
   return Make(16, 3, [&](const Hit& hit, int x, int y, std::uint16_t* pixel) {
     const DrawnSurface* then = surfaces[static_cast<std::size_t>(hit.surface)];
-    if (!IsSame(hit, then)) return;
+    if (!stays.At(hit, [&](const Hit& first) { return IsSame(first, then); })) return;
     const Triangle& triangle = surfaces_[static_cast<std::size_t>(hit.surface)].triangles[hit.triangle];
     const auto [place, depth] = next.PlaceOf(Between(then->positions_W, triangle, hit));
     if (depth <= 0) return;
@@ -320,7 +360,12 @@ Channel Truth::FlowTo(const Truth& next) const {
     if (u < 1 || v < 1 || u > 65535 || v > 65535) return;
     pixel[0] = Rounded(u, 65535);
     pixel[1] = Rounded(v, 65535);
-    pixel[2] = static_cast<std::uint16_t>(next.StateOf(place, depth, then, MaterialOf(hit), Footprint(hit)));
+    const auto is_same = [&](double apart_m) {
+      // The footprint, which takes longer to compute, is never less than that of a surface that faces the camera.
+      return apart_m < kSamePlace * static_cast<double>(hit.depth_m) / camera().focal ||
+             apart_m < kSamePlace * Footprint(hit);
+    };
+    pixel[2] = static_cast<std::uint16_t>(next.StateOf(place, depth, then, MaterialOf(hit), is_same));
     if (pixel[2] == static_cast<std::uint16_t>(FlowState::kNone)) pixel[0] = pixel[1] = 0;
   });
 }

@@ -54,7 +54,7 @@ struct Moment {
   std::vector<render::DrawnSurface> surfaces;
   render::Atlas atlas;
   std::optional<render::DrawnSurface> burn;  ///< Over the solids; none: no burnt chart of them is in the field.
-  render::BurnAtlas burn_atlas;              ///< Empty without `burn`.
+  render::BurnCharts burnt;                  ///< Texels of the charts of `burn`.
 };
 
 /// The ground truth of a moment.
@@ -75,6 +75,8 @@ class Truth {
 
   [[nodiscard]] TruthClass ClassOf(const render::Hit& hit) const;
   [[nodiscard]] int InstanceOf(const render::Hit& hit) const;
+  /// Class of an instance that a pixel can show.
+  [[nodiscard]] TruthClass ClassOf(int instance) const;
   /// Where the point of a pixel is, frame W.
   [[nodiscard]] Vec3d PointOf(const render::Hit& hit) const;
   /// Material coordinates of a pixel of membrane or fat [m].
@@ -96,7 +98,7 @@ class Truth {
   using Corner = std::array<float, 4>;
   void Draw(const render::Atlas& atlas);
   void TakeHeat(const render::Atlas& atlas);
-  void TakeHeatOfSolids(const render::DrawnSurface& burn, const render::BurnAtlas& atlas);
+  void TakeHeatOfSolids(const render::DrawnSurface& burn, const render::BurnCharts& charts);
   void SetHeat(int x, int y, const std::array<std::uint8_t, 4>& texel);
   /// Corners in the camera frame.
   [[nodiscard]] std::vector<Vec3d> InCamera(const render::DrawnSurface& surface) const;
@@ -105,9 +107,11 @@ class Truth {
   [[nodiscard]] Vec3d NormalOf(const render::Hit& hit) const;
   /// Longest extent of the pixel on its surface, at most ten times that on a surface that faces the camera [m].
   [[nodiscard]] double Footprint(const render::Hit& hit) const;
-  /// Whether a point that comes to this place and depth is visible here. @param material of a sheet.
+  /// Whether a point that comes to this place and depth is visible here. @param material of a sheet. @param is_same
+  /// whether places of a sheet that are so far apart [m] are one.
+  template <class SamePlace>
   [[nodiscard]] FlowState StateOf(const Vec2d& place, double depth_m, const render::DrawnSurface* surface,
-                                  const std::optional<Vec2d>& material, double footprint_m) const;
+                                  const std::optional<Vec2d>& material, const SamePlace& is_same) const;
   /// The surfaces in another moment; null: it is gone.
   [[nodiscard]] std::vector<const render::DrawnSurface*> SurfacesIn(const Truth& other) const;
   /// Whether the triangle is the same tissue in that moment.
@@ -116,6 +120,7 @@ class Truth {
   [[nodiscard]] Channel Make(int bits, int samples, const Value& value) const;
 
   Eigen::Matrix4d view_;
+  std::array<ToolKind, kMaxTools> kinds_;
   std::vector<render::DrawnSurface> surfaces_;
   std::vector<TruthClass> classes_;  // Of each surface.
   std::map<std::string, std::size_t> index_;

@@ -14,6 +14,7 @@
 #include "render_node/geometry/solid.h"
 #include "render_node/offscreen/png_writer.h"
 #include "render_node/scene_graph/display.h"
+#include "render_node/scene_graph/drawn_surfaces.h"
 #include "services/scene/builder/build.h"
 #include "tests/integration/render/synthetic_scene.h"
 
@@ -133,6 +134,35 @@ TEST_F(PictureTest, IsTheSameEveryTime) {
   const Bitmap first = draw(), second = draw();
   // One rasteriser on one machine: all pixels are equal. Between machines rounding may move an edge by a pixel.
   EXPECT_EQ(first.rgb, second.rgb);
+}
+
+TEST_F(PictureTest, OfACameraThatComesBackIsTheSame) {
+  RenderParams other = view_.render, brighter = view_.render;
+  other.scope_tip_W += Vec3f(0.005f, 0, 0);
+  brighter.scope_target_W += view_.render.scope_target_W - view_.render.scope_tip_W;  // Light for twice the distance.
+  LaparoscopeView laparoscope(view_);
+  const auto display = MakeOffscreenDisplay(laparoscope, view_.render);
+  const auto draw = [&](const RenderParams& camera) {
+    laparoscope.SetCamera(camera);
+    laparoscope.Update();
+    Bitmap picture;
+    display->DrawAndRead(&picture);
+    return picture.rgb;
+  };
+  const auto surfaces = DrawnSurfaces(laparoscope.root()).size();
+  const auto first = draw(view_.render), second = draw(other);
+  EXPECT_NE(first, second);
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_EQ(draw(view_.render), first);
+    EXPECT_EQ(draw(other), second);
+  }
+  const auto third = draw(brighter);
+  EXPECT_NE(third, first) << "the same place with another light";
+  laparoscope.SetCamera(view_.render);  // No picture is drawn from here.
+  EXPECT_EQ(draw(other), second);
+  EXPECT_EQ(draw(brighter), third);
+  EXPECT_EQ(draw(view_.render), first);
+  EXPECT_EQ(DrawnSurfaces(laparoscope.root()).size(), surfaces) << "also of cameras that rest";
 }
 
 TEST_F(PictureTest, TheMembraneIsHalfTransparent) {

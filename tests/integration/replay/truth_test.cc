@@ -403,13 +403,18 @@ TEST_F(TruthTest, HeatOfASolidIsThatOfItsBurntCharts) {
   EXPECT_GT(known, 0.9 * rectum) << "all charts are burnt";
 }
 
-TEST(RunLengths, AlternateColumnByColumnFromZero) {
+TEST(InstanceMasks, HaveBoxAreaAndRunsColumnByColumnFromZero) {
   Channel image(3, 2, 8, 1);
   image.At(0, 0) = image.At(0, 1) = image.At(1, 0) = 7;
   image.At(2, 1) = 3;
-  EXPECT_EQ(RunLengths(image, 7), (std::vector<std::uint32_t>{0, 3, 3}));
-  EXPECT_EQ(RunLengths(image, 3), (std::vector<std::uint32_t>{5, 1}));
-  EXPECT_EQ(RunLengths(image, 9), (std::vector<std::uint32_t>{6}));
+  const std::map<int, InstanceMask> masks = InstanceMasks(image);
+  ASSERT_EQ(masks.size(), 2u);
+  const InstanceMask &seven = masks.at(7), &three = masks.at(3);
+  EXPECT_EQ(seven.runs, (std::vector<std::uint32_t>{0, 3, 3}));
+  EXPECT_EQ(three.runs, (std::vector<std::uint32_t>{5, 1}));
+  EXPECT_EQ(seven.area, 3u);
+  EXPECT_EQ((std::array{seven.left, seven.top, seven.right, seven.bottom}), (std::array{0, 0, 2, 2}));
+  EXPECT_EQ((std::array{three.left, three.top, three.right, three.bottom}), (std::array{2, 1, 3, 2}));
 }
 
 }  // namespace

@@ -70,7 +70,6 @@ TEST_F(SolidBurnTest, MakesNothingBeforeTheFirstPatch) {
   const SolidBurn burn(view_);
   EXPECT_EQ(burn.atlas().width(), 0);
   EXPECT_TRUE(burn.atlas().texels().empty());
-  EXPECT_FALSE(burn.atlas().At(chart_, material_));
   EXPECT_TRUE(burn.triangles().empty());
   EXPECT_EQ(burn.additions(), 0u);
 }
@@ -157,7 +156,8 @@ TEST_F(SolidBurnTest, ASecondPatchOfTheSameChartAddsTexelsOnly) {
 TEST_F(SolidBurnTest, AChartHasTexelsWithinItsBoxOnly) {
   SolidBurn burn(view_);
   (void)burn.Apply(Patch(200));
-  const BurnAtlas atlas = burn.atlas();
+  const Index here[] = {chart_};
+  const BurnCharts atlas(burn.atlas(), here);
   (void)burn.Apply(Patch(255));
   const BurnAtlas::Texel burnt{34, 200, 0, 255};
   EXPECT_EQ(atlas.At(chart_, material_), burnt) << "a copy keeps its texels";
@@ -172,6 +172,7 @@ TEST_F(SolidBurnTest, AChartHasTexelsWithinItsBoxOnly) {
   EXPECT_FALSE(atlas.At(chart_, low - half));
   EXPECT_FALSE(atlas.At(chart_, high + half));
   EXPECT_FALSE(atlas.At(static_cast<Index>(charts_.charts.size()), material_)) << "there is no such chart";
+  EXPECT_FALSE(BurnCharts(burn.atlas(), {}).At(chart_, material_)) << "it was not asked for";
 }
 
 TEST_F(SolidBurnTest, EverySurfaceTakesItsOwnPatchesOnly) {
