@@ -17,6 +17,7 @@ constexpr const char* kUsage =
        replayer RECORDING --film
        replayer RECORDING --video FILE [options]
        replayer RECORDING --dataset DIR [options]
+       replayer RECORDING... --lerobot DIR [options]
        replayer RECORDING --test NODE [--expect HASH] [--assert EXPR...] [options]
 
 Replays a recorded session: nodes compute its ticks again from exactly the recorded inputs, and after each tick their
@@ -52,6 +53,12 @@ and poses, forces and keypoints of the instruments. The manual's page dataset.md
 
   replayer out/latest/recording.mcap --dataset dataset --every 0.2
 
+With --lerobot sessions become a set for robot learning in the layout of LeRobot v2.1: each recording is an episode,
+with a video of 30 pictures a second and a table of states and actions of the instruments. Needs the program ffmpeg. The
+same page describes it.
+
+  replayer out/2*/recording.mcap --lerobot lerobot
+
 With --test one node computes all ticks of the session, also after states that differ, and its figures are checked
 against --expect and --assert; --junit writes the result for a CI system. Without --expect and --assert each state must
 equal the recorded one. fulcrum test-node does the same.
@@ -83,6 +90,8 @@ void AddOptions(po::options_description* options) {
        "was")  //
       ("seed", po::value<std::int64_t>()->value_name("N")->default_value(1),
        "dataset: other numbers give other variations")  //
+      ("lerobot", po::value<std::string>()->value_name("DIR"),
+       "write a set for robot learning into this new folder")  //
       ("test", po::value<std::vector<std::string>>()->value_name("NODE"),
        "node to test: physics, thermal, haptics or render")  //
       ("expect", po::value<std::string>()->value_name("HASH"),
@@ -130,10 +139,10 @@ void AddOptions(po::options_description* options) {
 CommandLine::CommandLine(int argc, char** argv) {
   AddOptions(&options_);
   po::options_description all, hidden;
-  hidden.add_options()("recording", po::value<std::string>());
+  hidden.add_options()("recording", po::value<std::vector<std::string>>());
   all.add(options_).add(hidden);
   po::positional_options_description position;
-  position.add("recording", 1);
+  position.add("recording", -1);
   try {
     const auto style = po::command_line_style::default_style & ~po::command_line_style::allow_guessing;
     po::store(po::command_line_parser(argc, argv).options(all).positional(position).style(style).run(), values_);

@@ -15,6 +15,7 @@
 #include "services/apps/replayer/coco.h"
 #include "services/apps/replayer/dataset_sheet.h"
 #include "services/apps/replayer/frame_text.h"
+#include "services/apps/replayer/new_folder.h"
 #include "services/apps/replayer/projector.h"
 #include "services/apps/replayer/report_format.h"
 #include "services/apps/replayer/truth.h"
@@ -29,13 +30,6 @@ namespace fs = std::filesystem;
 constexpr int kWriters = 2;
 constexpr const char* kFolders[] = {"left",     "right", "depth",       "normal", "flow",
                                     "instance", "class", "temperature", "damage", "water"};
-
-void RefuseFilled(const fs::path& folder) {
-  std::error_code error;
-  if (fs::exists(folder) && !fs::is_empty(folder, error)) {
-    throw InputError(folder.string() + ": is not empty; name a new folder");
-  }
-}
 
 void MakeFolders(const DatasetSettings& settings) {
   std::error_code error;

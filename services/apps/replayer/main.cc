@@ -22,6 +22,7 @@ int Run(int argc, char** argv) {
   if (options.film) return replay::RunFilm(options);
   if (!options.video.empty()) return replay::RunVideo(options);
   if (!options.dataset.empty()) return replay::RunDataset(options);
+  if (!options.lerobot.folder.empty()) return replay::RunLerobot(options);
   if (options.test) return replay::RunTest(options);
   return replay::RunReplay(options);
 }

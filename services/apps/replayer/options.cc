@@ -41,25 +41,32 @@ const std::vector<NodeId> kPublishers{NodeId::kSupervisor, NodeId::kHandleBridge
 /// All nodes whose classes replayer contains.
 const std::vector<NodeId> kReplayable{NodeId::kPhysics, NodeId::kThermal, NodeId::kHaptics, NodeId::kRender};
 
-std::filesystem::path RecordingOf(const CommandLine& line) {
-  if (!line.Has("recording"))
-    throw InputError("RECORDING is missing, for example out/latest/recording.mcap; see --help");
-  std::filesystem::path recording = line.TextOf("recording");
-  if (!std::filesystem::exists(recording)) throw InputError(recording.string() + ": no such file");
-  return recording;
+std::vector<std::filesystem::path> RecordingsOf(const CommandLine& line) {
+  std::vector<std::filesystem::path> recordings;
+  for (const std::string& text : line.TextsOf("recording")) {
+    recordings.emplace_back(text);
+    if (!std::filesystem::exists(recordings.back())) throw InputError(text + ": no such file");
+  }
+  if (recordings.empty()) throw InputError("RECORDING is missing, for example out/latest/recording.mcap; see --help");
+  if (recordings.size() > 1 && !line.Has("lerobot")) {
+    throw InputError(recordings[1].string() + ": only --lerobot takes several recordings");
+  }
+  return recordings;
 }
 
 void CheckKind(const CommandLine& line) {
   int kinds = 0;
-  for (const char* kind : {"into", "live", "film", "video", "dataset", "test"}) kinds += line.Has(kind) ? 1 : 0;
+  for (const char* kind : {"into", "live", "film", "video", "dataset", "lerobot", "test"})
+    kinds += line.Has(kind) ? 1 : 0;
   if (kinds != 1)
     throw InputError(
-        "give one of --into NODE..., --live, --film, --video FILE, --dataset DIR and --test NODE; see --help");
+        "give one of --into NODE..., --live, --film, --video FILE, --dataset DIR, --lerobot DIR and --test NODE; see "
+        "--help");
 }
 
 LiveSettings LiveSettingsFrom(const CommandLine& line) {
   LiveSettings settings;
-  settings.recording = line.TextOf("recording");
+  settings.recording = RecordingsOf(line).front();
   settings.domain = line.ValueOf<int>("domain");
   settings.from_s = line.ValueOf<double>("from");
   if (line.Has("only") && line.Has("except")) throw InputError("give --only or --except, not both");
@@ -144,15 +151,30 @@ void ReadDataset(const CommandLine& line, Options* options) {
   options->dataset_seed = whole("seed", 1'000'000'000);
 }
 
-void ReadFiles(const CommandLine& line, Options* options) {
-  const std::filesystem::path& recording = options->lock_step.recording;
-  options->scene = recording::BesideRecording(line.TextOf("scene"), recording, "scene.fulcrum");
-  options->cart = recording::BesideRecording(line.TextOf("cart"), recording, "cart.yaml");
-  options->json = line.TextOf("json");
-  if (options->scene.empty()) {
+std::filesystem::path SceneOf(const CommandLine& line, const std::filesystem::path& recording) {
+  std::filesystem::path scene = recording::BesideRecording(line.TextOf("scene"), recording, "scene.fulcrum");
+  if (scene.empty()) {
     throw InputError("no scene.fulcrum beside " + recording.string() +
                      ": give the compiled scene of that session with --scene");
   }
+  return scene;
+}
+
+void ReadLerobot(const CommandLine& line, Options* options) {
+  options->lerobot.folder = line.TextOf("lerobot");
+  if (options->lerobot.folder.empty()) {
+    throw InputError("--lerobot: needs the name of a new folder, for example lerobot");
+  }
+  for (const std::filesystem::path& recording : RecordingsOf(line)) {
+    options->lerobot.sessions.push_back({recording, SceneOf(line, recording)});
+  }
+}
+
+void ReadFiles(const CommandLine& line, Options* options) {
+  const std::filesystem::path& recording = options->lock_step.recording;
+  options->scene = SceneOf(line, recording);
+  options->cart = recording::BesideRecording(line.TextOf("cart"), recording, "cart.yaml");
+  options->json = line.TextOf("json");
 }
 
 }  // namespace
@@ -168,7 +190,7 @@ Options ParseOptions(int argc, char** argv) {
     options.answer = std::string("replayer ") + app::kVersion + "\n";
     return options;
   }
-  options.lock_step.recording = RecordingOf(line);
+  options.lock_step.recording = RecordingsOf(line).front();
   CheckKind(line);
   options.live = line.Has("live");
   options.test = line.Has("test");
@@ -182,8 +204,9 @@ Options ParseOptions(int argc, char** argv) {
     return options;
   }
   options.quiet = line.Has("quiet") || ::isatty(STDERR_FILENO) == 0;
-  if (line.Has("video") || line.Has("dataset")) {
+  if (line.Has("video") || line.Has("dataset") || line.Has("lerobot")) {
     if (line.Has("video")) ReadVideo(line, &options);
+    if (line.Has("lerobot")) ReadLerobot(line, &options);
     if (line.Has("dataset")) ReadDataset(line, &options);
     ReadPace(line, &options.lock_step);
     ReadFiles(line, &options);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "services/apps/replayer/lerobot.h"
 #include "services/apps/replayer/live.h"
 #include "services/apps/replayer/lock_step.h"
 #include "services/apps/replayer/node_test.h"
@@ -23,7 +24,8 @@ struct Options {
   std::filesystem::path dataset;
   double dataset_every_s = 0, dataset_baseline_m = 0;
   std::uint32_t dataset_variations = 0, dataset_seed = 1;
-  bool console = false;  ///< --console.
+  LerobotSettings lerobot;  ///< --lerobot; its folder is empty: it was not given. Without `until_s`.
+  bool console = false;     ///< --console.
   LiveSettings live_settings;
   LockStepSettings lock_step;        ///< Without `folder`, which a run makes.
   bool pictures = false;             ///< Render was named; it is not in `lock_step.nodes`.

@@ -130,6 +130,22 @@ int RunDataset(const Options& options) {
   return static_cast<int>(ExitCode::kDone);
 }
 
+int RunLerobot(const Options& options) {
+  const ProgressLine progress(options.quiet);
+  LerobotSettings settings = options.lerobot;
+  settings.until_s = options.lock_step.until_s;
+  const LerobotResult result = MakeLerobot(settings, BeginFiles(progress));
+  progress.Clear();
+  std::cout << settings.folder.string() << ": " << settings.sessions.size() << " episodes, " << result.frames
+            << " frames, " << result.duration_s << " s\n";
+  if (!options.json.empty()) {
+    WriteText(options.json,
+              Format("{\n  \"episodes\": %zu,\n  \"frames\": %llu,\n  \"duration_s\": %.3f\n}\n",
+                     settings.sessions.size(), static_cast<unsigned long long>(result.frames), result.duration_s));
+  }
+  return static_cast<int>(ExitCode::kDone);
+}
+
 int RunReplay(const Options& options) {
   const scene::SceneFile scene(options.scene);
   LockStepSettings settings = options.lock_step;

@@ -20,4 +20,8 @@ int RunVideo(const Options& options);
 /// throws the same.
 int RunDataset(const Options& options);
 
+/// replayer --lerobot; see MakeLerobot(). Prints the result and writes it to `options.json`. Returns the exit code;
+/// throws the same.
+int RunLerobot(const Options& options);
+
 }  // namespace fulcrum::replay
