@@ -114,6 +114,20 @@ struct RenderParams {
   std::uint32_t hud = 1;          ///< 0: no figures in the picture; warnings remain.
 };
 
+/// How the pictures of two eyes share one picture, each at its full field and squeezed to half of the width or height.
+enum class StereoLayout : std::uint32_t {
+  kNone,        ///< One camera.
+  kSideBySide,  ///< Left eye on the left.
+  kTopBottom    ///< Left eye on top.
+};
+
+/// Keys `stereo`, `interocular_mm` and `convergence_mm` of section `render`.
+struct StereoParams {
+  StereoLayout layout = StereoLayout::kNone;
+  float interocular_m = 0.005f;  ///< Distance of the two eyes, which lie beside scope_tip_W.
+  float convergence_m = 0;       ///< Distance of the plane without disparity; 0: that of the camera's target.
+};
+
 /// Section `haptics`.
 struct HapticsParams {
   float force_limit_N = 3.3f;
@@ -333,6 +347,7 @@ struct TissueScene : SheetScene {
 /// The whole scene, as nodes read it. A solver takes the slice that it needs.
 struct SceneView : TissueScene {
   RenderParams render;
+  StereoParams stereo;
   HapticsParams haptics;
   AssessmentParams assessment = UsualAssessment();
 

@@ -321,6 +321,7 @@ SceneData AssembleScene(const SceneSettings& settings, const Anatomy& anatomy) {
   fixed.physics = settings.physics;
   fixed.thermal = settings.thermal;
   fixed.render = settings.render;
+  fixed.stereo = settings.stereo;
   fixed.haptics = settings.haptics;
   fixed.breathing = settings.breathing;
   fixed.assessment = settings.assessment;

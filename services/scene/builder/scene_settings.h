@@ -191,6 +191,7 @@ struct SceneSettings {
   PhysicsParams physics;
   ThermalParams thermal;
   RenderParams render;
+  StereoParams stereo;
   HapticsParams haptics;
   Breathing breathing;
   double organ_density_kg_m3 = 1050;

@@ -344,7 +344,7 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const MaterialLibr
     if (!has_sheets) entry.Fail("kind", "lies below a sheet, and the scene has none");
     scene.structures.push_back(ReadStructure(entry));
   }
-  ReadRender(root.MapOrDefaults("render"), &scene.render);
+  ReadRender(root.MapOrDefaults("render"), &scene.render, &scene.stereo);
   StrictMap tools = root.MapOrDefaults("tools");
   for (int i = 0; i < kMaxTools; ++i) {
     const std::string key = "tool" + std::to_string(i);

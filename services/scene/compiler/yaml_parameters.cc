@@ -113,7 +113,7 @@ void ReadThermal(StrictMap map, ThermalParams* t) {
   t->volume = map.Flag("volume", t->volume != 0) ? 1 : 0;
 }
 
-void ReadRender(StrictMap map, RenderParams* r) {
+void ReadRender(StrictMap map, RenderParams* r, StereoParams* s) {
   ReadInteger(&map, "width", 16, 7680, &r->width);
   ReadInteger(&map, "height", 16, 4320, &r->height);
   ReadSi(&map, "rate_Hz", Range::Between(0.1, 240), &r->rate_Hz);
@@ -125,6 +125,15 @@ void ReadRender(StrictMap map, RenderParams* r) {
       static_cast<float>(map.Number("scope_angle_deg", Decimal(r->scope_angle_deg), Range::Between(0, 90)));
   r->roll_deg = static_cast<float>(map.Number("roll_deg", Decimal(r->roll_deg), Range::Between(-180, 180)));
   ReadInteger(&map, "hud", 0, 1, &r->hud);
+  s->layout = map.Choice("stereo", s->layout,
+                         {{"none", StereoLayout::kNone},
+                          {"side_by_side", StereoLayout::kSideBySide},
+                          {"top_bottom", StereoLayout::kTopBottom}});
+  ReadSi(&map, "interocular_mm", Range::Between(1, 20), &s->interocular_m);
+  ReadSi(&map, "convergence_mm", Range::Between(0, 500), &s->convergence_m);
+  if (s->convergence_m != 0 && s->convergence_m < 0.01f) {
+    map.Fail("convergence_mm", "must be 10 to 500, or 0 (the distance of scope_target_mm)");
+  }
 }
 
 void ReadHaptics(StrictMap map, HapticsParams* h) {

@@ -18,7 +18,7 @@ void ReadInteger(config::StrictMap* map, const char* key, int min, int max, std:
 /// Each function reads its section; keys that are absent keep the values of the last argument. Throws InputError.
 void ReadPhysics(config::StrictMap map, PhysicsParams* p);
 void ReadThermal(config::StrictMap map, ThermalParams* t);
-void ReadRender(config::StrictMap map, RenderParams* r);
+void ReadRender(config::StrictMap map, RenderParams* r, StereoParams* s);
 void ReadHaptics(config::StrictMap map, HapticsParams* h);
 /// `mode`: of the physics section; in mode paper there is no breathing.
 void ReadBreathing(config::StrictMap map, PhysicsMode mode, Breathing* b);

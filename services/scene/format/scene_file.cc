@@ -5,10 +5,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <sstream>
+#include <string_view>
 
 #include "services/base/core/error.h"
 #include "services/base/core/hash.h"
@@ -24,6 +26,8 @@ constexpr std::size_t kAlignment = 64;
 constexpr char kMagic[8] = {'F', 'U', 'L', 'C', 'S', 'C', 'N', '\n'};
 constexpr const char* kFixedSection = "scene";
 constexpr const char* kSourceSection = "source_yaml";
+// One StereoParams, of scenes with a stereo picture only.
+constexpr const char* kStereoSection = "stereo";
 constexpr std::uint32_t kMaxSections = 64;
 
 struct FileHeader {
@@ -128,6 +132,8 @@ std::uint64_t TableChecksum(const FileHeader& header, std::span<const SectionEnt
   return hash.value();
 }
 
+bool HasStereo(const SceneView& view) { return view.stereo.layout != StereoLayout::kNone; }
+
 std::size_t Align(std::size_t offset) { return (offset + kAlignment - 1) / kAlignment * kAlignment; }
 
 struct Payload {
@@ -149,6 +155,7 @@ std::uint64_t ContentHash(const SceneView& view) {
   ForEachBodySection(view, [&](const char* name, auto& span) {
     if (!span.empty()) add(name, span);
   });
+  if (HasStereo(view)) hash.Add(std::as_bytes(std::span(&view.stereo, 1)));
   return hash.value();
 }
 
@@ -166,6 +173,9 @@ std::uint64_t WriteSceneFile(const SceneView& view, const std::string& source_ya
   ForEachSection(view, [&]<class T>(const char* name, std::span<const T> span) {
     payloads.push_back({name, std::as_bytes(span), sizeof(T)});
   });
+  if (HasStereo(view)) {
+    payloads.push_back({kStereoSection, std::as_bytes(std::span(&view.stereo, 1)), sizeof(StereoParams)});
+  }
   payloads.push_back({kSourceSection, std::as_bytes(std::span(source_yaml)), 1});
 
   FileHeader header{};
@@ -228,6 +238,7 @@ struct SceneFile::Impl {
   void Map();
   void Read();
   [[nodiscard]] const SectionEntry& Find(const std::string& section, std::size_t element_bytes) const;
+  void ReadStereo();
   [[noreturn]] void Refuse(const std::string& section, const std::string& reason) const {
     throw InputError(file.string() + ": section '" + section + "': " + reason +
                      "; compile the scene again with scene_compiler");
@@ -325,6 +336,7 @@ void SceneFile::Impl::Read() {
     const SectionEntry& entry = Find(name, sizeof(T));
     span = {reinterpret_cast<const T*>(data + entry.offset), entry.bytes / sizeof(T)};
   });
+  ReadStereo();
   if (const auto fault = FindFault(view)) {
     Refuse(fault->section, fault->reason);
   }
@@ -332,6 +344,14 @@ void SceneFile::Impl::Read() {
   if (ContentHash(view) != header.content_hash) {
     Refuse("header", "the content hash is wrong: the file was altered");
   }
+}
+
+void SceneFile::Impl::ReadStereo() {
+  const auto named = [](const SectionEntry& entry) { return std::string_view(entry.name) == kStereoSection; };
+  if (std::ranges::none_of(table, named)) return;
+  const SectionEntry& entry = Find(kStereoSection, sizeof(StereoParams));
+  if (entry.bytes != sizeof(StereoParams)) Refuse(kStereoSection, "there must be exactly one");
+  view.stereo = *reinterpret_cast<const StereoParams*>(data + entry.offset);
 }
 
 SceneFile::SceneFile(const std::filesystem::path& file) : impl_(std::make_unique<Impl>()) {

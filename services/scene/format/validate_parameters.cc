@@ -37,6 +37,15 @@ void CheckAssessment(const AssessmentParams& a) {
   }
 }
 
+void CheckStereo(const StereoParams& s) {
+  if (s.layout > StereoLayout::kTopBottom) {
+    Fail("scene", "render.stereo = ", static_cast<std::uint32_t>(s.layout),
+         "; valid: 0 (none), 1 (side_by_side), 2 (top_bottom)");
+  }
+  CheckBounds({{"render.interocular", s.interocular_m, 1e-3f, 0.02f}});
+  if (s.convergence_m != 0) CheckBounds({{"render.convergence", s.convergence_m, 0.01f, 0.5f}});
+}
+
 }  // namespace
 
 void CheckParameters(const SceneView& s) {
@@ -44,6 +53,7 @@ void CheckParameters(const SceneView& s) {
   const ThermalParams& t = s.thermal;
   const RenderParams& r = s.render;
   const HapticsParams& h = s.haptics;
+  CheckStereo(s.stereo);
   if (p.mode > PhysicsMode::kAccurate) {
     Fail("scene", "physics.mode = ", static_cast<std::uint32_t>(p.mode), "; valid: 0 (paper), 1 (xpbd), 2 (accurate)");
   }

@@ -69,6 +69,7 @@ void Reseal(Bytes* file) {
   scene::ForEachBodySection(view, [&](const char* name, auto&) {
     if (!named(name).empty()) content.Add(named(name));
   });
+  if (!named("stereo").empty()) content.Add(named("stereo"));
   for (const Section& section : sections) {
     Hash64 hash;
     hash.Add(section.bytes);

@@ -97,6 +97,32 @@ TEST_F(SceneFileTest, BreathingIsKept) {
   EXPECT_EQ(file.view().breathing.period_s, 3.5f);
 }
 
+TEST_F(SceneFileTest, StereoIsKeptAndChangesNothingOfOtherScenes) {
+  SceneSettings settings = Small();
+  settings.stereo = {StereoLayout::kNone, 0.004f, 0.08f};
+  const auto without = dir_ / "without.scene";
+  EXPECT_EQ(WriteSceneFile(BuildProcedural(settings), kSource, without), hash_);
+  std::ifstream in(without, std::ios::binary);
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), bytes_);
+  EXPECT_EQ(bytes_.find("stereo"), std::string::npos) << "no section of that name";
+
+  settings.stereo.layout = StereoLayout::kTopBottom;
+  const std::uint64_t hash = WriteSceneFile(BuildProcedural(settings), kSource, file_);
+  EXPECT_NE(hash, hash_);
+  const SceneFile file(file_);
+  EXPECT_EQ(file.view().stereo.layout, StereoLayout::kTopBottom);
+  EXPECT_EQ(file.view().stereo.interocular_m, 0.004f);
+  EXPECT_EQ(file.view().stereo.convergence_m, 0.08f);
+  EXPECT_EQ(ContentHash(file.view()), hash);
+
+  for (const StereoParams& bad : {StereoParams{static_cast<StereoLayout>(3), 0.004f, 0},
+                                  {StereoLayout::kSideBySide, 0.03f, 0},
+                                  {StereoLayout::kSideBySide, 0.004f, 0.001f}}) {
+    settings.stereo = bad;
+    EXPECT_THROW((void)WriteSceneFile(BuildProcedural(settings), kSource, file_), InputError);
+  }
+}
+
 TEST_F(SceneFileTest, AssessmentIsKept) {
   SceneSettings settings = Small();
   settings.assessment.on = 1;
