@@ -1,24 +1,40 @@
 #include "render_node/geometry/field_of_view.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace fulcrum::render {
+namespace {
 
-FieldOfView::FieldOfView(const Laparoscope& scope) {
+Eigen::Matrix4f PlanesOf(const Laparoscope& scope) {
   const Eigen::Matrix4f to_clip = scope.projection * scope.view;
+  Eigen::Matrix4f planes;
   for (int axis = 0; axis < 2; ++axis) {
     const float reach = std::min(1.0f, scope.circle_radius / scope.picture_centre[axis]);
-    planes_.row(2 * axis) = to_clip.row(axis) - reach * to_clip.row(3);
-    planes_.row(2 * axis + 1) = -to_clip.row(axis) - reach * to_clip.row(3);
+    planes.row(2 * axis) = to_clip.row(axis) - reach * to_clip.row(3);
+    planes.row(2 * axis + 1) = -to_clip.row(axis) - reach * to_clip.row(3);
   }
-  eye_W_ = -scope.view.block<3, 3>(0, 0).transpose() * scope.view.block<3, 1>(0, 3);
+  return planes;
+}
+
+}  // namespace
+
+FieldOfView::FieldOfView(std::span<const Laparoscope> eyes) : stereo_(eyes.size() > 1) {
+  const Eigen::Matrix4f left = PlanesOf(eyes.front()), right = PlanesOf(eyes.back());
+  const Vec3f left_W = EyeOf(eyes.front()), right_W = EyeOf(eyes.back());
+  planes_ = 0.5f * (left + right);
+  apart_ = 0.5f * (right - left).row(0).transpose();
+  eye_W_ = 0.5f * (left_W + right_W);
+  half_W_ = 0.5f * (right_W - left_W);
 }
 
 bool FieldOfView::Find(std::span<const Vec3f> positions, std::span<const Triangle> triangles, Sides sides,
                        std::vector<Triangle>* seen) {
   beyond_.resize(positions.size());
   for (std::size_t i = 0; i < positions.size(); ++i) {
-    const Eigen::Vector4f distance = planes_.leftCols<3>() * positions[i] + planes_.col(3);
+    Eigen::Vector4f distance = planes_.leftCols<3>() * positions[i] + planes_.col(3);
+    // Of the two eyes' distances from an edge the smaller one.
+    if (stereo_) distance.head<2>().array() -= std::abs(apart_.head<3>().dot(positions[i]) + apart_[3]);
     beyond_[i] = static_cast<std::uint8_t>((distance[0] > 0 ? 1 : 0) | (distance[1] > 0 ? 2 : 0) |
                                            (distance[2] > 0 ? 4 : 0) | (distance[3] > 0 ? 8 : 0));
   }
@@ -30,7 +46,8 @@ bool FieldOfView::Find(std::span<const Vec3f> positions, std::span<const Triangl
     }
     if (sides == Sides::kFront) {
       const Vec3f& a = positions[t[0]];
-      if ((positions[t[1]] - a).cross(positions[t[2]] - a).dot(eye_W_ - a) <= 0) {
+      const Vec3f normal = (positions[t[1]] - a).cross(positions[t[2]] - a);
+      if (normal.dot(eye_W_ - a) + std::abs(normal.dot(half_W_)) <= 0) {
         continue;
       }
     }

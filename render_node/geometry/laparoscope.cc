@@ -55,6 +55,32 @@ Laparoscope MakeLaparoscope(const RenderParams& params) {
   return scope;
 }
 
+Vec3f EyeOf(const Laparoscope& scope) {
+  return -scope.view.block<3, 3>(0, 0).transpose() * scope.view.block<3, 1>(0, 3);
+}
+
+RenderParams BesideOf(const RenderParams& camera, float by_m) {
+  const Vec3f right = MakeLaparoscope(camera).view.block<1, 3>(0, 0).transpose();
+  RenderParams moved = camera;
+  moved.scope_tip_W += by_m * right;
+  moved.scope_target_W += by_m * right;
+  return moved;
+}
+
+std::vector<Laparoscope> MakeEyes(const RenderParams& camera, const StereoParams& stereo) {
+  if (stereo.layout == StereoLayout::kNone) return {MakeLaparoscope(camera)};
+  const float convergence_m =
+      stereo.convergence_m > 0 ? stereo.convergence_m : (camera.scope_target_W - camera.scope_tip_W).norm();
+  std::vector<Laparoscope> eyes;
+  for (const float by_m : {-0.5f * stereo.interocular_m, 0.5f * stereo.interocular_m}) {
+    Laparoscope& eye = eyes.emplace_back(MakeLaparoscope(BesideOf(camera, by_m)));
+    // x of the clip coordinates plus by_m * focal at the convergence distance, in proportion to the depth -z.
+    eye.projection(0, 2) = -eye.projection(0, 0) * by_m / convergence_m;
+    eye.light_position.x() -= by_m;
+  }
+  return eyes;
+}
+
 PixelBox FitPicture(const RenderParams& params, int window_width, int window_height) {
   const double aspect = static_cast<double>(params.width) / static_cast<double>(params.height);
   const double most = std::min(window_width, kWidest);

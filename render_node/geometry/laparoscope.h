@@ -1,6 +1,8 @@
 // The laparoscope as a camera: view and projection, its light, its round field. Pure.
 #pragma once
 
+#include <vector>
+
 #include "services/base/core/scene_view.h"
 
 namespace fulcrum::render {
@@ -20,6 +22,19 @@ struct Laparoscope {
 /// and the light's axis between the two; with 0 degrees shaft, light and line of sight coincide. fov_deg is the angle
 /// over the height.
 [[nodiscard]] Laparoscope MakeLaparoscope(const RenderParams& params);
+
+/// Place of the lens, frame W [m].
+[[nodiscard]] Vec3f EyeOf(const Laparoscope& scope);
+
+/// The camera beside `camera`, `by_m` to the right in its picture [m], with a parallel line of sight.
+[[nodiscard]] RenderParams BesideOf(const RenderParams& camera, float by_m);
+
+/// The cameras of the picture: MakeLaparoscope(camera), or with stereo the left and the right eye of that scope. Their
+/// lines of sight are parallel and their frusta asymmetric, so that a point at the convergence distance has the same
+/// place in both pictures; a point at depth d [m] has the disparity (left minus right)
+///   interocular * focal * (1 / d - 1 / convergence) [pixels], focal = height / (2 tan(fov / 2)).
+/// Both have the scope's one light, because its fibres do not move with the eye.
+[[nodiscard]] std::vector<Laparoscope> MakeEyes(const RenderParams& camera, const StereoParams& stereo);
 
 /// A rectangle of a window [pixels]; (x, y) is its lower left corner.
 struct PixelBox {

@@ -6,6 +6,8 @@
 
 namespace fulcrum::render {
 
+/// With stereo the eye is the one in the middle, and a pixel is one of an eye's part stretched to the whole picture, as
+/// a 3-D display shows it: a motion of the pointer means the same in either part.
 /// @param height of the picture [pixels].
 [[nodiscard]] HandsView MakeHandsView(const SceneView& scene, const RenderParams& camera, int height,
                                       const ToolState& tools);

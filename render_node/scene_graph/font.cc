@@ -69,7 +69,7 @@ const Glyph& GlyphSheet::Size::Of(char32_t character) const {
   return found != glyphs.end() ? found->second : glyphs.at(U'?');
 }
 
-GlyphSheet MakeGlyphSheet(int capital_height) {
+GlyphSheet MakeGlyphSheet(int capital_height, double squeeze_x, double squeeze_y) {
   FT_Library opened = nullptr;
   Check(FT_Init_FreeType(&opened));
   const std::unique_ptr<FT_LibraryRec_, EndLibrary> library(opened);
@@ -83,7 +83,8 @@ GlyphSheet MakeGlyphSheet(int capital_height) {
   for (std::size_t k = 0; k < sheet.sizes.size(); ++k) {
     GlyphSheet::Size& size = sheet.sizes[k];
     const double em = static_cast<double>(k + 1) * capital_height / kCapitalOfEm;
-    Check(FT_Set_Pixel_Sizes(face, 0, static_cast<FT_UInt>(std::lround(em))));
+    Check(FT_Set_Pixel_Sizes(face, static_cast<FT_UInt>(std::lround(squeeze_x * em)),
+                             static_cast<FT_UInt>(std::lround(squeeze_y * em))));
     const int below = Pixels(-face->size->metrics.descender);
     size.height = below + Pixels(face->size->metrics.ascender);
     int x = kWidest;  // The first character begins a row.

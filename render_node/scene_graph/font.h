@@ -27,7 +27,8 @@ struct GlyphSheet {
   std::vector<std::uint8_t> pixels;
 };
 /// @param capital_height of plain text [pixels].
-[[nodiscard]] GlyphSheet MakeGlyphSheet(int capital_height);
+/// @param squeeze_x, squeeze_y factors in (0, 1] on width and height, for a picture that a display stretches again.
+[[nodiscard]] GlyphSheet MakeGlyphSheet(int capital_height, double squeeze_x = 1, double squeeze_y = 1);
 
 /// Height of a capital in a picture of this height [pixels]: 2.6 % of it, at least 10 pixels.
 [[nodiscard]] int CapitalHeight(int picture_height);

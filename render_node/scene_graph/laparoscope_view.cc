@@ -4,6 +4,7 @@
 #include <osg/BlendFunc>
 #include <osg/Depth>
 #include <osg/Geode>
+#include <vector>
 
 #include "render_node/geometry/atlas.h"
 #include "render_node/geometry/bleeding.h"
@@ -55,11 +56,13 @@ struct LaparoscopeView::Impl {
   void BindTextures();
   void ShowFat();
   void CastShadows();
+  void PlaceEyes();
   void ShineFrom(const Laparoscope& from);
 
   SceneView scene;
   const Look look;
-  Laparoscope scope;
+  Laparoscope scope;  // With stereo in the middle of the eyes.
+  std::vector<Laparoscope> eyes;
   Atlas atlas;
   AtlasTexture atlas_texture;
   TissueLayers layers;
@@ -91,16 +94,17 @@ LaparoscopeView::Impl::Impl(const SceneView& view, const Look& given)
     : scene(view),
       look(given),
       scope(MakeLaparoscope(view.render)),
+      eyes(MakeEyes(view.render, view.stereo)),
       atlas(view),
       atlas_texture(atlas),
-      layers(view, scope),
+      layers(view, eyes),
       surroundings(view, scope, look),
       instruments(view),
       shadow(view),
       bleeding(view, serosa, kSerosaTexels, kSerosaPerMetre),
-      overlay(static_cast<int>(view.render.width), static_cast<int>(view.render.height)),
-      optics(scope, static_cast<int>(view.render.width), static_cast<int>(view.render.height), surroundings.fixed(),
-             scene_root) {
+      overlay(view.stereo.layout, static_cast<int>(view.render.width), static_cast<int>(view.render.height)),
+      optics(view.stereo.layout, eyes, static_cast<int>(view.render.width), static_cast<int>(view.render.height),
+             surroundings.fixed(), scene_root) {
   DrawIn(Order::kInstruments, instruments.node()->getOrCreateStateSet());
   shadow_mesh.state()->setAttributeAndModes(MakeProgram("shadow.vert", "shadow.frag"));
   DrawIn(Order::kShadow, shadow_mesh.state());
@@ -145,7 +149,6 @@ void LaparoscopeView::Impl::BindTextures() {
   state->addUniform(new osg::Uniform("behind", 0.0f));
   state->addUniform(new osg::Uniform("shift", osg::Vec3(0, 0, 0)));
   state->addUniform(new osg::Uniform("atlas_per_metre", osg::Vec2(1 / size.x(), 1 / size.y())));
-  state->addUniform(new osg::Uniform("light_position", vec3(scope.light_position)));
   state->addUniform(new osg::Uniform("light_axis", vec3(scope.light_axis)));
   optics.SetLight(look.light);
   state->addUniform(new osg::Uniform("light_colour", vec3(look.light)));
@@ -164,6 +167,12 @@ void LaparoscopeView::Impl::BindTextures() {
 void LaparoscopeView::Impl::ShineFrom(const Laparoscope& from) {
   wall_direction->set(osg::Vec3(from.wall_direction.x(), from.wall_direction.y(), from.wall_direction.z()));
   light_power->set(from.light_power);
+}
+
+void LaparoscopeView::Impl::PlaceEyes() {
+  scope = MakeLaparoscope(scene.render);
+  eyes = MakeEyes(scene.render, scene.stereo);
+  layers.SetEyes(eyes);
 }
 
 // Chooses the visible triangles of the fat: those that meet the condition of fat.frag with a margin, or are bared.
@@ -251,9 +260,8 @@ void LaparoscopeView::SetSize(int width, int height) {
   RenderParams& render = impl_->scene.render;
   render.width = static_cast<std::uint32_t>(width);
   render.height = static_cast<std::uint32_t>(height);
-  impl_->scope = MakeLaparoscope(render);
-  impl_->layers.SetScope(impl_->scope);
-  impl_->optics.SetSize(impl_->scope, width, height);
+  impl_->PlaceEyes();
+  impl_->optics.SetSize(impl_->eyes, width, height);
   impl_->overlay.SetSize(width, height);
 }
 
@@ -263,9 +271,8 @@ void LaparoscopeView::SetCamera(const RenderParams& params) {
   render.scope_target_W = params.scope_target_W;
   render.roll_deg = params.roll_deg;
   render.fov_deg = params.fov_deg;
-  impl_->scope = MakeLaparoscope(render);
-  impl_->layers.SetScope(impl_->scope);
-  impl_->optics.SetScope(impl_->scope);
+  impl_->PlaceEyes();
+  impl_->optics.SetEyes(impl_->eyes);
   impl_->ShineFrom(impl_->scope);
 }
 

@@ -67,13 +67,13 @@ class Optics::CopyTarget : public osg::Drawable {
   const osg::Camera* camera_ = nullptr;                    // Owns this: a reference would keep both for good.
 };
 
-Optics::Optics(const Laparoscope& scope, int width, int height, osg::Node* background, osg::Node* scene)
-    : scope_(scope),
-      width_(width),
-      height_(height),
+Optics::Optics(StereoLayout layout, std::span<const Laparoscope> eyes, int width, int height, osg::Node* background,
+               osg::Node* scene)
+    : layout_(layout),
       node_(new osg::Group),
-      circle_radius_(new osg::Uniform("circle_radius", 1.0f)),
-      picture_centre_(new osg::Uniform("picture_centre", osg::Vec2())),
+      radius_(new osg::Uniform("circle_radius", osg::Vec2())),
+      centre_(new osg::Uniform("picture_centre", osg::Vec2())),
+      half_(new osg::Uniform("half_height", osg::Vec2())),
       texture_scale_(new osg::Uniform("texture_scale", osg::Vec2(1, 1))),
       texture_most_(new osg::Uniform("texture_most", osg::Vec2(1, 1))),
       pixel_(new osg::Uniform("pixel", osg::Vec2())),
@@ -84,32 +84,47 @@ Optics::Optics(const Laparoscope& scope, int width, int height, osg::Node* backg
       smooth_lens_(MakeProgram("field.vert", "smooth.frag")),
       soiled_lens_(MakeProgram("field.vert", "soiled.frag")) {
   osg::StateSet* state = node_->getOrCreateStateSet();
-  state->addUniform(circle_radius_);
-  state->addUniform(picture_centre_);
-  for (Background& each : backgrounds_) {
-    each.target = MakeTarget(0, background);
-    each.target.camera->setClearColor(osg::Vec4(0.12f, 0.035f, 0.03f, 1));
-  }
-  scene_ = MakeTarget(1, scene);
-  scene_.camera->setClearMask(0);
-  for (Background& each : backgrounds_) {
-    each.copy = new osg::Geode;
-    each.copy->addDrawable(new CopyTarget(each.target, scene_));
-    scene_.camera->addChild(each.copy);
-  }
-  AddField();
+  for (osg::Uniform* uniform : {radius_.get(), centre_.get(), half_.get()}) state->addUniform(uniform);
+  for (std::size_t k = 0; k < eyes.size(); ++k) AddEye(background, scene);
   SetLight(Vec3f::Ones());
-  SetScope(scope);
-  UseScale();
+  SetEyes(eyes);
+  SetSize(eyes, width, height);
 }
 
-void Optics::SetSize(const Laparoscope& scope, int width, int height) {
-  scope_ = scope;
-  width_ = width;
-  height_ = height;
-  scene_.camera->setProjectionMatrix(ToOsg(scope.projection));
-  backgrounds_[used_].target.camera->setProjectionMatrix(ToOsg(scope.projection));
-  backgrounds_[used_].from = scope;
+void Optics::AddEye(osg::Node* background, osg::Node* scene) {
+  Eye eye;
+  const int order = 2 * static_cast<int>(eyes_.size());
+  eye.light_position = new osg::Uniform("light_position", osg::Vec3());
+  for (Background& each : eye.backgrounds) each.target = MakeTarget(order, background);
+  eye.scene = MakeTarget(order + 1, scene);
+  eye.scene.camera->setClearMask(0);
+  eye.scene.camera->getOrCreateStateSet()->addUniform(eye.light_position);
+  for (Background& each : eye.backgrounds) {
+    each.target.camera->setClearColor(osg::Vec4(0.12f, 0.035f, 0.03f, 1));
+    each.target.camera->getOrCreateStateSet()->addUniform(eye.light_position);
+    each.copy = new osg::Geode;
+    each.copy->addDrawable(new CopyTarget(each.target, eye.scene));
+    eye.scene.camera->addChild(each.copy);
+  }
+  eye.field = AddField(eye.scene.colour);
+  eyes_.push_back(eye);
+}
+
+void Optics::SetSize(std::span<const Laparoscope> eyes, int width, int height) {
+  width_ = layout_ == StereoLayout::kSideBySide ? std::max(1, width / 2) : width;
+  height_ = layout_ == StereoLayout::kTopBottom ? std::max(1, height / 2) : height;
+  const Vec2f squeeze(static_cast<float>(width_) / static_cast<float>(width),
+                      static_cast<float>(height_) / static_cast<float>(height));
+  circle_radius_ = eyes.front().circle_radius * squeeze;
+  picture_centre_ = eyes.front().picture_centre.cwiseProduct(squeeze);
+  half_height_ = eyes.front().picture_centre.y() * squeeze;
+  for (std::size_t k = 0; k < eyes_.size(); ++k) {
+    Background& background = eyes_[k].backgrounds[eyes_[k].used];
+    for (const Target& target : {background.target, eyes_[k].scene}) {
+      target.camera->setProjectionMatrix(ToOsg(eyes[k].projection));
+    }
+    background.from = eyes[k];
+  }
   ResizeTextures();
 }
 
@@ -122,21 +137,24 @@ void Optics::SetMostScale(float most) {
 int Optics::Texels(int pixels) const { return static_cast<int>(std::lround(most_ * static_cast<float>(pixels))); }
 
 void Optics::ResizeTextures() {
-  for (const Target& target : {backgrounds_[0].target, backgrounds_[1].target, scene_}) {
+  const auto resize = [this](const Target& target) {
     for (osg::Texture2D* texture : {target.colour.get(), target.depth.get()}) {
       texture->setTextureSize(Texels(width_), Texels(height_));
       texture->dirtyTextureObject();
     }
     // Without this OpenSceneGraph keeps the framebuffer of the previous textures.
     target.camera->dirtyAttachmentMap();
+  };
+  for (const Eye& eye : eyes_) {
+    for (const Background& each : eye.backgrounds) resize(each.target);
+    resize(eye.scene);
   }
   UseScale();
 }
 
 Optics::Target Optics::MakeTarget(int order, osg::Node* content) {
-  const auto make_texture = [this](GLint internal, GLenum format, GLenum type) {
+  const auto make_texture = [](GLint internal, GLenum format, GLenum type) {
     osg::ref_ptr<osg::Texture2D> texture = new osg::Texture2D;
-    texture->setTextureSize(width_, height_);
     texture->setInternalFormat(internal);
     texture->setSourceFormat(format);
     texture->setSourceType(type);
@@ -158,26 +176,36 @@ Optics::Target Optics::MakeTarget(int order, osg::Node* content) {
   target.camera->attach(osg::Camera::DEPTH_BUFFER, target.depth);
   target.camera->setComputeNearFarMode(osg::Camera::DO_NOT_COMPUTE_NEAR_FAR);
   target.camera->setCullingMode(osg::CullSettings::NO_CULLING);
-  target.camera->setProjectionMatrix(ToOsg(scope_.projection));
   target.camera->setFinalDrawCallback(new DrawnOnce(target.camera));
   target.camera->addChild(content);
   node_->addChild(target.camera);
   return target;
 }
 
-void Optics::AddField() {
+osg::ref_ptr<osg::StateSet> Optics::AddField(osg::Texture2D* scene) {
+  // Clip coordinates of an eye's part: its centre and half its size, and the direction of the other eye's.
+  osg::Vec4 part(0, 0, 1, 1);
+  osg::Vec2 border;
+  const float side = eyes_.empty() ? 1 : -1;  // The left eye is on the left, or on top.
+  if (layout_ == StereoLayout::kSideBySide) {
+    part.set(-0.5f * side, 0, 0.5f, 1);
+    border.set(side, 0);
+  } else if (layout_ == StereoLayout::kTopBottom) {
+    part.set(0, 0.5f * side, 1, 0.5f);
+    border.set(0, -side);
+  }
   Mesh field("field", false);
-  field_state_ = field.state();
-  field_state_->setAttributeAndModes(clear_lens_);
-  field.state()->addUniform(new osg::Uniform("scene_picture", static_cast<int>(kPictureUnit)));
-  field.state()->addUniform(texture_scale_);
-  field.state()->addUniform(texture_most_);
-  field.state()->addUniform(pixel_);
-  field.state()->addUniform(soil_);
-  field.state()->addUniform(haze_);
-  field.state()->addUniform(smoke_);
-  field.state()->setMode(GL_DEPTH_TEST, osg::StateAttribute::OFF);
-  field.state()->setRenderBinDetails(0, "RenderBin");
+  const osg::ref_ptr<osg::StateSet> state = field.state();
+  for (osg::Uniform* uniform :
+       {new osg::Uniform("scene_picture", static_cast<int>(kPictureUnit)), new osg::Uniform("part", part),
+        new osg::Uniform("border", border), texture_scale_.get(), texture_most_.get(), pixel_.get(), soil_.get(),
+        haze_.get(), smoke_.get()}) {
+    state->addUniform(uniform);
+  }
+  state->setTextureAttribute(kPictureUnit, scene);
+  if (layout_ != StereoLayout::kNone) state->setMode(GL_CLIP_PLANE0, osg::StateAttribute::ON);
+  state->setMode(GL_DEPTH_TEST, osg::StateAttribute::OFF);
+  state->setRenderBinDetails(0, "RenderBin");
   std::vector<Vec3f> positions{Vec3f::Zero()};
   std::vector<Triangle> triangles;
   for (Index k = 0; k < kSides; ++k) {
@@ -190,7 +218,7 @@ void Optics::AddField() {
   const osg::ref_ptr<osg::Geode> geode = new osg::Geode;
   geode->addDrawable(field.geometry());
   node_->addChild(geode);
-  node_->getOrCreateStateSet()->setTextureAttribute(kPictureUnit, scene_.colour);
+  return state;
 }
 
 void Optics::SetScale(float scale) {
@@ -204,12 +232,15 @@ void Optics::UseScale() {
     return std::clamp(static_cast<int>(std::lround(scale_ * static_cast<float>(full))), 1, Texels(full));
   };
   const int width = pixels(width_), height = pixels(height_);
-  for (const Background& each : backgrounds_) each.target.camera->setViewport(0, 0, width, height);
-  scene_.camera->setViewport(0, 0, width, height);
+  for (const Eye& eye : eyes_) {
+    for (const Background& each : eye.backgrounds) each.target.camera->setViewport(0, 0, width, height);
+    eye.scene.camera->setViewport(0, 0, width, height);
+  }
   const osg::Vec2 share(static_cast<float>(width) / static_cast<float>(width_),
                         static_cast<float>(height) / static_cast<float>(height_));
-  circle_radius_->set(scope_.circle_radius * share.y());
-  picture_centre_->set(osg::Vec2(scope_.picture_centre.x() * share.x(), scope_.picture_centre.y() * share.y()));
+  radius_->set(osg::Vec2(circle_radius_.x(), circle_radius_.y()) * share.y());
+  centre_->set(osg::Vec2(picture_centre_.x() * share.x(), picture_centre_.y() * share.y()));
+  half_->set(osg::Vec2(half_height_.x(), half_height_.y()) * share.y());
   const osg::Vec2 texel(1.0f / static_cast<float>(Texels(width_)), 1.0f / static_cast<float>(Texels(height_)));
   const osg::Vec2 used(static_cast<float>(width) * texel.x(), static_cast<float>(height) * texel.y());
   texture_scale_->set(used);
@@ -220,35 +251,40 @@ void Optics::UseScale() {
   BackgroundsChanged();
 }
 
-void Optics::SetScope(const Laparoscope& scope) {
-  const osg::Matrix view = ToOsg(scope.view), projection = ToOsg(scope.projection);
-  scene_.camera->setViewMatrix(view);
-  scene_.camera->setProjectionMatrix(projection);
-  SceneChanged();
-  for (const std::size_t k : {used_, 1 - used_}) {
-    const std::optional<Laparoscope>& from = backgrounds_[k].from;
-    if (from && from->view == scope.view && from->projection == scope.projection &&
-        from->light_power == scope.light_power) {
-      return Use(k);
-    }
+void Optics::SetEyes(std::span<const Laparoscope> eyes) {
+  for (std::size_t k = 0; k < eyes_.size(); ++k) {
+    Eye& eye = eyes_[k];
+    const Laparoscope& seen = eyes[k];
+    eye.light_position->set(osg::Vec3(seen.light_position.x(), seen.light_position.y(), seen.light_position.z()));
+    const auto look = [&](osg::Camera* camera) {
+      camera->setViewMatrix(ToOsg(seen.view));
+      camera->setProjectionMatrix(ToOsg(seen.projection));
+    };
+    look(eye.scene.camera);
+    const auto is_of = [&](const Background& each) {
+      return each.from && each.from->view == seen.view && each.from->projection == seen.projection &&
+             each.from->light_power == seen.light_power;
+    };
+    if (is_of(eye.backgrounds[eye.used])) continue;
+    eye.Use(1 - eye.used);
+    Background& next = eye.backgrounds[eye.used];
+    if (is_of(next)) continue;
+    look(next.target.camera);
+    next.target.camera->setNodeMask(~0u);
+    next.from = seen;
   }
-  Use(1 - used_);
-  Background& next = backgrounds_[used_];
-  next.target.camera->setViewMatrix(view);
-  next.target.camera->setProjectionMatrix(projection);
-  next.target.camera->setNodeMask(~0u);
-  next.from = scope;
+  SceneChanged();
 }
 
-void Optics::Use(std::size_t background) {
-  Background &before = backgrounds_[used_], &now = backgrounds_[background];
-  if (background != used_ && before.target.camera->getNodeMask() != 0) {
+void Optics::Eye::Use(std::size_t background) {
+  Background& before = backgrounds[used];
+  if (before.target.camera->getNodeMask() != 0) {
     before.from.reset();  // It has not been drawn.
     before.target.camera->setNodeMask(0);
   }
   before.copy->setNodeMask(0);
-  now.copy->setNodeMask(~0u);
-  used_ = background;
+  backgrounds[background].copy->setNodeMask(~0u);
+  used = background;
 }
 
 void Optics::SetSoil(float soil) {
@@ -269,16 +305,21 @@ void Optics::SetLight(const Vec3f& light) {
 void Optics::UseLens() {
   float soil = 0;
   (void)soil_->get(soil);
-  field_state_->setAttributeAndModes(soil > 0 ? soiled_lens_ : scale_ > 1 ? smooth_lens_ : clear_lens_);
+  osg::Program* lens = (soil > 0 ? soiled_lens_ : scale_ > 1 ? smooth_lens_ : clear_lens_).get();
+  for (const Eye& eye : eyes_) eye.field->setAttributeAndModes(lens);
 }
 
-void Optics::SceneChanged() { scene_.camera->setNodeMask(~0u); }
+void Optics::SceneChanged() {
+  for (const Eye& eye : eyes_) eye.scene.camera->setNodeMask(~0u);
+}
 
 void Optics::BackgroundsChanged() {
-  Background &now = backgrounds_[used_], &other = backgrounds_[1 - used_];
-  now.target.camera->setNodeMask(~0u);
-  other.target.camera->setNodeMask(0);
-  other.from.reset();
+  for (Eye& eye : eyes_) {
+    Background &now = eye.backgrounds[eye.used], &other = eye.backgrounds[1 - eye.used];
+    now.target.camera->setNodeMask(~0u);
+    other.target.camera->setNodeMask(0);
+    other.from.reset();
+  }
   SceneChanged();
 }
 

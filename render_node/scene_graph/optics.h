@@ -1,6 +1,7 @@
 // Drawing of the scene into the picture: the scene is drawn into a texture at the resolution of the quality setting,
-// and its round field is scaled into the picture. The static background is drawn once for a place of the camera, into a
-// texture of its own, and copied with its depth before each picture of the scene.
+// and its round field is scaled into the picture. The static background is drawn once for a place of the camera,
+// into a texture of its own, and copied with its depth before each picture of the scene. With stereo each eye has its own textures, half as wide or
+// high as the picture, and its field fills its half of the picture; the meshes are the same.
 #pragma once
 
 #include <array>
@@ -9,6 +10,8 @@
 #include <osg/Geode>
 #include <osg/Program>
 #include <osg/Texture2D>
+#include <span>
+#include <vector>
 
 #include "render_node/geometry/laparoscope.h"
 
@@ -16,18 +19,19 @@ namespace fulcrum::render {
 
 class Optics {
  public:
-  /// Keeps both nodes. The textures have `width` x `height` pixels.
-  Optics(const Laparoscope& scope, int width, int height, osg::Node* background, osg::Node* scene);
+  /// Keeps both nodes. @param eyes of MakeEyes(), for the picture of `width` x `height` pixels.
+  Optics(StereoLayout layout, std::span<const Laparoscope> eyes, int width, int height, osg::Node* background,
+         osg::Node* scene);
 
-  /// Replaces the textures by those of another size. `scope` is that of the new picture.
-  void SetSize(const Laparoscope& scope, int width, int height);
+  /// Replaces the textures by those of another size. `eyes` are those of the new picture.
+  void SetSize(std::span<const Laparoscope> eyes, int width, int height);
   /// Resolution of the scene as a share of width and height, in (0, most].
   void SetScale(float scale);
   /// Largest scale, 1 at first: the textures have as many pixels.
   void SetMostScale(float most);
-  /// Moves the camera; the size of the picture does not change. The backgrounds of the last two places are kept, for
+  /// Moves the cameras; the size of the picture does not change. The backgrounds of the last two places are kept, for
   /// pictures of two cameras in turn.
-  void SetScope(const Laparoscope& scope);
+  void SetEyes(std::span<const Laparoscope> eyes);
   /// 0: clear lens … 1: nothing to be seen (services/base/core/lens.h).
   void SetSoil(float soil);
   /// Share of the light that smoke scatters: 0 none.
@@ -48,28 +52,34 @@ class Optics {
     osg::ref_ptr<osg::Geode> copy;    // Into the scene.
     std::optional<Laparoscope> from;  // None: nothing has been drawn, nor will be in the next picture.
   };
+  /// What an eye sees, and its part of the picture.
+  struct Eye {
+    void Use(std::size_t background);
+
+    std::array<Background, 2> backgrounds;
+    std::size_t used = 0;  // Of them.
+    Target scene;
+    osg::ref_ptr<osg::Uniform> light_position;
+    osg::ref_ptr<osg::StateSet> field;
+  };
   class CopyTarget;
   Target MakeTarget(int order, osg::Node* content);
+  void AddEye(osg::Node* background, osg::Node* scene);
   void BackgroundsChanged();
-  void Use(std::size_t background);
-  void AddField();
+  [[nodiscard]] osg::ref_ptr<osg::StateSet> AddField(osg::Texture2D* scene);
   void UseScale();
   void UseLens();
   void ResizeTextures();
   [[nodiscard]] int Texels(int pixels) const;
 
-  Laparoscope scope_;
-  int width_;
-  int height_;
+  StereoLayout layout_;
+  int width_ = 1, height_ = 1;                          // Of an eye's part of the picture [pixels].
+  Vec2f circle_radius_, picture_centre_, half_height_;  // In such pixels across and up.
   float scale_ = 1, most_ = 1;
   osg::ref_ptr<osg::Group> node_;
-  osg::ref_ptr<osg::Uniform> circle_radius_, picture_centre_, texture_scale_, texture_most_, pixel_, soil_, haze_,
-      smoke_;
+  osg::ref_ptr<osg::Uniform> radius_, centre_, half_, texture_scale_, texture_most_, pixel_, soil_, haze_, smoke_;
   osg::ref_ptr<osg::Program> clear_lens_, smooth_lens_, soiled_lens_;
-  osg::ref_ptr<osg::StateSet> field_state_;
-  std::array<Background, 2> backgrounds_;
-  std::size_t used_ = 0;  // Of them.
-  Target scene_;
+  std::vector<Eye> eyes_;
 };
 
 }  // namespace fulcrum::render

@@ -15,7 +15,7 @@ constexpr int kGlyphUnit = 7;  // A texture unit that no other shader uses.
 
 }  // namespace
 
-Overlay::Overlay(int width, int height) : mesh_("overlay", true) {
+Overlay::Overlay(StereoLayout layout, int width, int height) : layout_(layout), mesh_("overlay", true) {
   mesh_.state()->setAttributeAndModes(MakeProgram("overlay.vert", "overlay.frag"));
   mesh_.state()->addUniform(new osg::Uniform("glyphs", kGlyphUnit));
   mesh_.state()->setMode(GL_DEPTH_TEST, osg::StateAttribute::OFF);
@@ -28,7 +28,8 @@ void Overlay::SetSize(int width, int height) {
   const int capital = CapitalHeight(height);
   if (capital == capital_) return;
   capital_ = capital;
-  sheet_ = MakeGlyphSheet(capital);
+  const bool beside = layout_ == StereoLayout::kSideBySide, above = layout_ == StereoLayout::kTopBottom;
+  sheet_ = MakeGlyphSheet(capital, beside ? 0.5 : 1, above ? 0.5 : 1);
   osg::ref_ptr<osg::Texture2D> texture = MakeTexture(sheet_.width, sheet_.height, 1, sheet_.pixels, false);
   texture->setFilter(osg::Texture::MIN_FILTER, osg::Texture::NEAREST);
   texture->setFilter(osg::Texture::MAG_FILTER, osg::Texture::NEAREST);
@@ -39,7 +40,9 @@ void Overlay::Set(std::span<const OverlayText> texts) {
   std::vector<Vec3f> positions;
   std::vector<std::array<float, 4>> coordinates, colours;
   std::vector<Triangle> triangles;
-  const int margin = 2 * capital_ / 3;
+  const bool beside = layout_ == StereoLayout::kSideBySide, above = layout_ == StereoLayout::kTopBottom;
+  const int width = beside ? width_ / 2 : width_, height = above ? height_ / 2 : height_;  // Of an eye's part.
+  const int margin = 2 * capital_ / 3, margin_x = beside ? margin / 2 : margin, margin_y = above ? margin / 2 : margin;
   const int pitch = sheet_.sizes[0].height;
   for (const OverlayText& text : texts) {
     const bool top = text.corner == Corner::kTopLeft || text.corner == Corner::kTopRight;
@@ -48,22 +51,28 @@ void Overlay::Set(std::span<const OverlayText> texts) {
     const std::u32string characters = Characters(text.text);
     int length = 0;
     for (const char32_t character : characters) length += size.Of(character).width;
-    int x = left ? margin : width_ - margin - length;
-    const int y = top ? height_ - margin - pitch * text.size * (text.line + 1) : margin + pitch * text.size * text.line;
-    for (const char32_t character : characters) {
-      const auto first = static_cast<Index>(positions.size());
-      const Glyph& glyph = size.Of(character);
-      for (int corner = 0; corner < 4; ++corner) {
-        const int dx = corner == 1 || corner == 2 ? glyph.width : 0, dy = corner >= 2 ? size.height : 0;
-        positions.emplace_back(2.0f * static_cast<float>(x + dx) / static_cast<float>(width_) - 1,
-                               2.0f * static_cast<float>(y + dy) / static_cast<float>(height_) - 1, 0.0f);
-        coordinates.push_back({static_cast<float>(glyph.x + dx) / static_cast<float>(sheet_.width),
-                               static_cast<float>(glyph.y + dy) / static_cast<float>(sheet_.height), 0, 0});
-        colours.push_back(text.warning ? kWarning : kText);
+    const int from = left ? margin_x : width - margin_x - length;
+    const int up = pitch * text.size;
+    const int y = top ? height - margin_y - up * (text.line + 1) : margin_y + up * text.line;
+    for (int eye = 0; eye < (beside || above ? 2 : 1); ++eye) {
+      // The left eye's part is on the left, or on top.
+      int x = from + (beside && eye == 1 ? width : 0);
+      const int row = y + (above && eye == 0 ? height_ - height : 0);
+      for (const char32_t character : characters) {
+        const auto first = static_cast<Index>(positions.size());
+        const Glyph& glyph = size.Of(character);
+        for (int corner = 0; corner < 4; ++corner) {
+          const int dx = corner == 1 || corner == 2 ? glyph.width : 0, dy = corner >= 2 ? size.height : 0;
+          positions.emplace_back(2.0f * static_cast<float>(x + dx) / static_cast<float>(width_) - 1,
+                                 2.0f * static_cast<float>(row + dy) / static_cast<float>(height_) - 1, 0.0f);
+          coordinates.push_back({static_cast<float>(glyph.x + dx) / static_cast<float>(sheet_.width),
+                                 static_cast<float>(glyph.y + dy) / static_cast<float>(sheet_.height), 0, 0});
+          colours.push_back(text.warning ? kWarning : kText);
+        }
+        triangles.push_back({first, first + 1, first + 2});
+        triangles.push_back({first, first + 2, first + 3});
+        x += glyph.width;
       }
-      triangles.push_back({first, first + 1, first + 2});
-      triangles.push_back({first, first + 2, first + 3});
-      x += glyph.width;
     }
   }
   mesh_.SetPositions(positions);

@@ -1,4 +1,5 @@
-// Text in the corners of the picture, outside the round field.
+// Text in the corners of the picture, outside the round field. With stereo each eye sees it at the same place, squeezed
+// as its part of the picture is.
 #pragma once
 
 #include <array>
@@ -6,6 +7,7 @@
 
 #include "render_node/scene_graph/font.h"
 #include "render_node/scene_graph/mesh.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::render {
 
@@ -22,7 +24,7 @@ struct OverlayText {
 class Overlay {
  public:
   /// Size of the picture [pixels].
-  Overlay(int width, int height);
+  Overlay(StereoLayout layout, int width, int height);
   /// The text changes its size with the next Set().
   void SetSize(int width, int height);
   /// Replaces all text.
@@ -31,6 +33,7 @@ class Overlay {
   [[nodiscard]] osg::StateSet* state() const { return mesh_.state(); }
 
  private:
+  const StereoLayout layout_;
   int width_;
   int height_;
   int capital_ = 0;  // Height of a capital of plain text [pixels].

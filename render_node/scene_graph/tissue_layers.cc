@@ -25,9 +25,8 @@ constexpr std::size_t kMostLinePoints = 64;  // As in membrane.frag.
 constexpr float kInkReach = 0.001f;
 constexpr float kFasciaDepth = 0.0006f;  // [m] Below the peritoneum: the least depth of the fat.
 
-Vec3f EyeOf(const Laparoscope& scope) {
-  return -scope.view.block<3, 3>(0, 0).transpose() * scope.view.block<3, 1>(0, 3);
-}
+/// The place in the middle of the eyes.
+Vec3f MiddleOf(std::span<const Laparoscope> eyes) { return 0.5f * (EyeOf(eyes.front()) + EyeOf(eyes.back())); }
 
 float PixelsPerRad(const Laparoscope& scope) { return scope.projection(1, 1) * scope.picture_centre.y(); }
 
@@ -59,11 +58,11 @@ void SetLook(SolidLook look, osg::StateSet* state) {
 
 }  // namespace
 
-TissueLayers::TissueLayers(const SceneView& scene, const Laparoscope& scope)
+TissueLayers::TissueLayers(const SceneView& scene, std::span<const Laparoscope> eyes)
     : scene_(scene),
-      field_(scope),
-      eye_W_(EyeOf(scope)),
-      pixels_per_rad_(PixelsPerRad(scope)),
+      field_(eyes),
+      eye_W_(MiddleOf(eyes)),
+      pixels_per_rad_(PixelsPerRad(eyes.front())),
       membrane_(scene),
       detail_(scene.membrane),
       fat_(scene, kFatStride),
@@ -184,10 +183,10 @@ bool TissueLayers::SetTopology(const TopologyState& topology) {
   return true;
 }
 
-void TissueLayers::SetScope(const Laparoscope& scope) {
-  field_ = FieldOfView(scope);
-  eye_W_ = EyeOf(scope);
-  pixels_per_rad_ = PixelsPerRad(scope);
+void TissueLayers::SetEyes(std::span<const Laparoscope> eyes) {
+  field_ = FieldOfView(eyes);
+  eye_W_ = MiddleOf(eyes);
+  pixels_per_rad_ = PixelsPerRad(eyes.front());
   scope_changed_ = true;
 }
 

@@ -22,8 +22,8 @@ namespace fulcrum::render {
 
 class TissueLayers {
  public:
-  /// Keeps a reference to the arrays of `scene`.
-  TissueLayers(const SceneView& scene, const Laparoscope& scope);
+  /// Keeps a reference to the arrays of `scene`. @param eyes of MakeEyes(): what one of them sees is drawn.
+  TissueLayers(const SceneView& scene, std::span<const Laparoscope> eyes);
 
   /// Particles in scene order, 3 * n floats [m]. @pre n is the scene's count.
   void SetTissue(std::span<const float> xyz);
@@ -31,7 +31,7 @@ class TissueLayers {
   bool SetTopology(const TopologyState& topology);
   /// Applies a patch of the solids. Returns false if it is of the membrane, lies outside or has the wrong size.
   bool Burn(const TemperaturePatch& patch) { return burn_.Apply(patch, geode_); }
-  void SetScope(const Laparoscope& scope);
+  void SetEyes(std::span<const Laparoscope> eyes);
   /// Draws the membrane in so many triangles as a picture with `factor` times as many lines needs; 1 at first.
   void SetDetail(float factor);
   /// Draws a triangle of the fat if one of its corners is `visible`, as a function of (s, t) [m] and thickness 0 … 1,

@@ -8,8 +8,9 @@ uniform vec3 wall_direction; // Towards the lit wall above, which wet tissue ref
 uniform float light_power;   // Irradiance at 1 m; falls off with the square of the distance.
 uniform vec3 light_colour;   // Of all light that the camera gets: its white and its exposure.
 uniform vec3 tissue_tint;    // Of the light that tissue returns.
-uniform float circle_radius; // Of the round picture [pixels].
+uniform vec2 circle_radius;  // Of the round picture, across and up [pixels]: stereo squeezes it.
 uniform vec2 picture_centre; // [pixels]
+uniform vec2 half_height;    // Half of the picture's height, in pixels across and up.
 
 // The scope's light: cone with a soft rim, inverse square.
 float Irradiance(vec3 position, out vec3 to_light) {

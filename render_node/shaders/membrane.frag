@@ -43,7 +43,7 @@ float PlannedInk(vec2 m) {
 // Offset in (s, t) [m] from a point of the sheet to the point above the place of the fascia that the same pixel shows.
 // It follows from the displacement in the picture of a step of `fascia_depth` along the normal.
 vec2 ToFascia(vec2 m, vec3 n) {
-  vec2 pixels = osg_ProjectionMatrix[1][1] * picture_centre.y * fascia_depth / -position.z *
+  vec2 pixels = osg_ProjectionMatrix[1][1] * half_height * fascia_depth / -position.z *
                 (n.xy - n.z * position.xy / position.z);
   vec2 step = pixels.x * dFdx(m) + pixels.y * dFdy(m);
   // Limited, because it would become infinite for a sheet that is seen edge on.

@@ -83,7 +83,9 @@ class DatasetMaker {
     Frame drawn{frame, time_s, {}, {}, FrameState(node, projector_.replay().contact_model()), std::nullopt};
     node.DrawFrom(camera, &drawn.left);
     drawn.moment.emplace(&node.view(), render::MakeLaparoscope(camera), scene_, drawn.left.width, drawn.left.height);
-    if (settings_.baseline_m > 0) node.DrawFrom(RightOf(camera, settings_.baseline_m), &drawn.right);
+    if (settings_.baseline_m > 0) {
+      node.DrawFrom(render::BesideOf(camera, static_cast<float>(settings_.baseline_m)), &drawn.right);
+    }
     if (images_.valid()) images_.get();
     images_ = std::async(std::launch::async, [this, given = std::move(drawn)]() mutable { Write(std::move(given)); });
   }
@@ -142,12 +144,13 @@ class DatasetMaker {
 DatasetResult MakeDataset(const DatasetSettings& settings, const SceneView& scene,
                           const std::function<void(double)>& progress) {
   RefuseFilled(settings.folder);
-  if (settings.variations == 0) return DatasetMaker(settings, scene, {}).Make(progress);
+  SceneView varied = scene;
+  varied.stereo = {};  // A data set has a baseline of its own, and each camera a picture.
+  if (settings.variations == 0) return DatasetMaker(settings, varied, {}).Make(progress);
   DatasetResult all;
   std::string said;
   for (std::uint32_t i = 0; i < settings.variations; ++i) {
     const Variation variation = VariationOf(scene, settings.seed, i);
-    SceneView varied = scene;
     varied.render = variation.camera;
     DatasetSettings one = settings;
     one.folder = settings.folder / Format("%03u", i);

@@ -51,14 +51,6 @@ std::string KeypointText(const char* name, const Vec3d& p_W, double radius_m, co
 
 }  // namespace
 
-RenderParams RightOf(const RenderParams& camera, double baseline_m) {
-  const Vec3f right = render::MakeLaparoscope(camera).view.block<1, 3>(0, 0).transpose();
-  RenderParams moved = camera;
-  moved.scope_tip_W += static_cast<float>(baseline_m) * right;
-  moved.scope_target_W += static_cast<float>(baseline_m) * right;
-  return moved;
-}
-
 std::string CalibrationText(const render::Pinhole& camera, double baseline_m, std::span<const Solid> solids) {
   std::string text = Format(
       "{\n  \"width\": %d,\n  \"height\": %d,\n  \"fx\": %.6f,\n  \"fy\": %.6f,\n  \"cx\": %.3f,\n  \"cy\": %.3f,\n"

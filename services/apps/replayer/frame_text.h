@@ -11,9 +11,6 @@
 
 namespace fulcrum::replay {
 
-/// The camera moved to its right [m]; both look in the same direction.
-[[nodiscard]] RenderParams RightOf(const RenderParams& camera, double baseline_m);
-
 /// Intrinsics of both cameras, units of the images, names of the classes and of the organs that have instances.
 [[nodiscard]] std::string CalibrationText(const render::Pinhole& camera, double baseline_m,
                                           std::span<const Solid> solids);

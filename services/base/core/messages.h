@@ -296,6 +296,8 @@ struct TemperaturePatch {
 inline constexpr std::size_t kMaxPictureBytes = 512 * 1024;
 
 /// A picture of the laparoscope with what shows where a pixel lies in W.
+/// With stereo (`render.stereo` of the scene) the eye is in the middle of the two, and pixels are those of an eye's
+/// part stretched to the whole picture.
 struct PictureHeader {
   Stamp stamp;                                            ///< Time of the shown ToolState.
   double session_time_s = 0;                              ///< Session time at which it was drawn.

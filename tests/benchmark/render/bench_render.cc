@@ -62,14 +62,17 @@ void Sway(const std::vector<float>& rest, int step, std::vector<float>* xyz) {
   }
 }
 
-void FullScene(const SceneView& scene, std::uint32_t width, std::uint32_t height, benchmark::Report* report) {
-  const std::string prefix = "render.full_scene_" + std::to_string(height) + "p.";
+void FullScene(const SceneView& scene, StereoLayout layout, std::uint32_t width, std::uint32_t height,
+               benchmark::Report* report) {
+  const std::string what = layout == StereoLayout::kNone ? "full_scene_" : "stereo_";
+  const std::string prefix = "render." + what + std::to_string(height) + "p.";
   if (!report->Wants(prefix)) {
     return;
   }
   SceneView view = scene;
   view.render.width = width;
   view.render.height = height;
+  view.stereo.layout = layout;
   LaparoscopeView laparoscope(view);
   const auto display = MakeOffscreenDisplay(laparoscope, view.render);
   std::printf("# %s\n", display->description().c_str());
@@ -357,8 +360,10 @@ int main(int argc, char** argv) {
   try {
     const scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());
     const SceneView view = data.View();
-    render::FullScene(view, 1280, 720, &report);
-    render::FullScene(view, 1920, 1080, &report);
+    for (const StereoLayout layout : {StereoLayout::kNone, StereoLayout::kSideBySide}) {
+      render::FullScene(view, layout, 1280, 720, &report);
+      render::FullScene(view, layout, 1920, 1080, &report);
+    }
     render::ReadBack(view, &report);
     render::Edges(view, &report);
     render::Flicker(view, &report);

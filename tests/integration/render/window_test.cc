@@ -148,6 +148,35 @@ TEST_F(WindowTest, KeepsTheShapeOfThePictureAndItsTextAtAnySize) {
   }
 }
 
+class StereoWindowTest : public WindowTest {
+ protected:
+  StereoWindowTest() { view_.stereo.layout = StereoLayout::kSideBySide; }
+};
+
+TEST_F(StereoWindowTest, HasBothFieldsInTheirHalvesAtAnySize) {
+  const auto check = [&](const WindowPicture& picture) {
+    SCOPED_TRACE(std::to_string(picture.width) + " x " + std::to_string(picture.height));
+    const PixelBox box = FitPicture(view_.render, picture.width, picture.height);
+    const double tolerance = 3 + 0.01 * box.height;
+    for (const int eye : {0, 1}) {
+      const int middle = box.x + (1 + 2 * eye) * box.width / 4;
+      int first = picture.width, last = -1;
+      for (int x = middle - box.width / 4; x < middle + box.width / 4; ++x) {
+        if (!IsField(At(picture, x, picture.height / 2))) continue;
+        first = std::min(first, x);
+        last = std::max(last, x);
+      }
+      EXPECT_NEAR(last - first + 1, kRadius * box.height, tolerance) << "squeezed to a half";
+      EXPECT_NEAR(0.5 * (first + last), middle, tolerance);
+      EXPECT_NEAR(ColumnAt(picture, middle + box.height / 8), box.height, tolerance);
+    }
+  };
+  for (const auto& [width, height] :
+       {std::pair{kWidth, kHeight}, {1000, 1000}, {3840, 2160}, {1500, 401}, {333, 777}}) {
+    check(Resized(width, height));
+  }
+}
+
 TEST_F(WindowTest, TellsTheReaderOfLivePicturesHowLargeAPixelIs) {
   const auto reader = bus_.pictures.MakeInput();
   Picture picture;

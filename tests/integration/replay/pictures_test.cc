@@ -239,6 +239,29 @@ TEST(Dataset, HasAllImagesOfEachFrameAndIsTheSameTwice) {
   EXPECT_EQ(count, kFrames);
 }
 
+TEST(Dataset, HasOneCameraAPictureAlsoWhereTheSceneHasStereo) {
+  std::vector<std::map<std::string, std::string>> sets;
+  std::vector<std::string> pictures;
+  for (const StereoLayout layout : {StereoLayout::kNone, StereoLayout::kSideBySide}) {
+    const auto change = [&](scene::SceneData* data) {
+      Small(data);
+      data->fixed.stereo.layout = layout;
+    };
+    const testing::ShortSession session("dataset_stereo_test", {.seconds = 1}, change);
+    const std::filesystem::path folder = session.folder() / "set";
+    OutputOf("replayer", {session.recording(), "--dataset", folder, "--every", "0.6", "--until", "0.7"});
+    sets.push_back(FilesBelow(folder));
+    Projector projector(session.recording(), session.scene());
+    projector.GoTo(0.6);
+    render::Bitmap picture;
+    ASSERT_TRUE(projector.Draw(&picture));
+    pictures.emplace_back(picture.rgb.begin(), picture.rgb.end());
+  }
+  EXPECT_TRUE(sets[0] == sets[1]);
+  EXPECT_EQ(pictures[0].size(), pictures[1].size());
+  EXPECT_NE(pictures[0], pictures[1]) << "a replay shows both eyes";
+}
+
 TEST(Dataset, VariesLightTissueAndScopeByItsSeed) {
   const testing::ShortSession session("vary_test", {.seconds = 0.5}, Small);
   const auto made = [&](const char* name, const char* seed) {

@@ -38,7 +38,7 @@ TEST_F(DetailTest, NoTriangleInTheFieldIsLeftOut) {
   RenderParams close = view_.render;
   close.fov_deg = 25;
   const Laparoscope scope = MakeLaparoscope(close);
-  FieldOfView field(scope);
+  FieldOfView field({&scope, 1});
   MembraneMesh mesh(view_);
   mesh.Update(xyz_);
   std::vector<Triangle> seen;
@@ -58,10 +58,37 @@ TEST_F(DetailTest, NoTriangleInTheFieldIsLeftOut) {
   }
 }
 
+TEST_F(DetailTest, WithTwoEyesNothingThatOneOfThemSeesIsLeftOut) {
+  RenderParams close = view_.render;
+  close.fov_deg = 25;
+  const Laparoscope middle = MakeLaparoscope(close);
+  int missed_in_the_middle = 0;
+  for (const float convergence_m : {0.03f, 0.06f, 0.5f}) {
+    const std::vector<Laparoscope> eyes = MakeEyes(close, {StereoLayout::kSideBySide, 0.01f, convergence_m});
+    for (const Sides sides : {Sides::kBoth, Sides::kFront}) {
+      const auto found = [&](std::span<const Laparoscope> cameras) {
+        std::vector<Triangle> seen;
+        FieldOfView(cameras).Find(view_.rest_position, view_.tube_surface, sides, &seen);
+        std::sort(seen.begin(), seen.end());
+        return seen;
+      };
+      const std::vector<Triangle> seen = found(eyes), one = found({&middle, 1});
+      for (const Laparoscope& eye : eyes) {
+        for (const Triangle& t : found({&eye, 1})) {
+          EXPECT_TRUE(std::binary_search(seen.begin(), seen.end(), t));
+          missed_in_the_middle += std::binary_search(one.begin(), one.end(), t) ? 0 : 1;
+        }
+      }
+      EXPECT_LT(seen.size(), view_.tube_surface.size());
+    }
+  }
+  EXPECT_GT(missed_in_the_middle, 0) << "one eye would do, and the test shows nothing";
+}
+
 TEST_F(DetailTest, WhatTurnsItsBackIsLeftOutOfAClosedSurface) {
   const Laparoscope scope = MakeLaparoscope(view_.render);
   std::vector<Triangle> both, front;
-  FieldOfView field(scope);
+  FieldOfView field({&scope, 1});
   field.Find(view_.rest_position, view_.tube_surface, Sides::kBoth, &both);
   field.Find(view_.rest_position, view_.tube_surface, Sides::kFront, &front);
   EXPECT_LT(front.size(), 0.7 * static_cast<double>(both.size()));

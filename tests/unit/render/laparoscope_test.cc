@@ -51,6 +51,46 @@ TEST(LaparoscopeTest, TheHorizonRollsClockwise) {
   EXPECT_NEAR(ToClip(scope, Vec3f(0, 0, 0.01f)).y(), 0, 1e-5f);
 }
 
+TEST(StereoEyesTest, DisparityIsThatOfParallelCamerasThatMeetAtTheConvergence) {
+  RenderParams params;
+  params.scope_tip_W = Vec3f(0.01f, -0.08f, 0.09f);
+  params.scope_target_W = Vec3f(0, 0.01f, 0.02f);
+  params.roll_deg = 20;
+  const Laparoscope scope = MakeLaparoscope(params);
+  const Mat3f turn = scope.view.block<3, 3>(0, 0).transpose();
+  for (const float given_m : {0.0f, 0.07f}) {
+    const StereoParams stereo{StereoLayout::kSideBySide, 0.005f, given_m};
+    const float convergence_m = given_m > 0 ? given_m : (params.scope_target_W - params.scope_tip_W).norm();
+    const std::vector<Laparoscope> eyes = MakeEyes(params, stereo);
+    ASSERT_EQ(eyes.size(), 2u);
+    EXPECT_NEAR((EyeOf(eyes[1]) - EyeOf(eyes[0])).norm(), 0.005f, 1e-7f);
+    EXPECT_LT((0.5f * (EyeOf(eyes[0]) + EyeOf(eyes[1])) - params.scope_tip_W).norm(), 1e-7f);
+    for (const float depth_m : {0.01f, 0.05f, convergence_m, 0.2f}) {
+      const Vec3f p_W = EyeOf(scope) + turn * Vec3f(0.1f * depth_m, -0.2f * depth_m, -depth_m);
+      const Vec3f left = ToClip(eyes[0], p_W), right = ToClip(eyes[1], p_W), middle = ToClip(scope, p_W);
+      const float disparity = scope.projection(0, 0) * 0.005f * (1 / depth_m - 1 / convergence_m);
+      EXPECT_NEAR(left.x() - right.x(), disparity, 1e-4f) << depth_m;
+      EXPECT_NEAR(0.5f * (left.x() + right.x()), middle.x(), 1e-4f) << depth_m;
+      EXPECT_NEAR(left.y(), middle.y(), 1e-4f);
+      EXPECT_NEAR(right.y(), middle.y(), 1e-4f);
+    }
+    // One light for both.
+    const Vec3f in_left = EyeOf(eyes[0]) + turn * eyes[0].light_position;
+    EXPECT_LT((EyeOf(eyes[1]) + turn * eyes[1].light_position - in_left).norm(), 1e-7f);
+    EXPECT_LT((EyeOf(scope) + turn * scope.light_position - in_left).norm(), 1e-7f);
+  }
+}
+
+TEST(StereoEyesTest, WithoutStereoThereIsTheScopesOwnCamera) {
+  RenderParams params;
+  params.scope_tip_W = Vec3f(0.01f, -0.08f, 0.09f);
+  const std::vector<Laparoscope> eyes = MakeEyes(params, {});
+  ASSERT_EQ(eyes.size(), 1u);
+  EXPECT_EQ(eyes[0].view, MakeLaparoscope(params).view);
+  EXPECT_EQ(eyes[0].projection, MakeLaparoscope(params).projection);
+  EXPECT_EQ(eyes[0].light_position, MakeLaparoscope(params).light_position);
+}
+
 TEST(CameraControlTest, TurnsAboutTheTargetAndComesBack) {
   RenderParams scene;
   scene.scope_tip_W = Vec3f(0.004f, -0.06f, 0.08f);
