@@ -27,6 +27,10 @@ float DistanceToSegment(const Vec2f& p, const Vec2f& a, const Vec2f& b) {
   return (p - a - t * ab).norm();
 }
 
+constexpr int kFilmCell = 2;  // Texels in a cell of the film, in each direction.
+
+void Raise(float value, std::uint8_t* byte) { *byte = std::max(*byte, static_cast<std::uint8_t>(value + 0.5f)); }
+
 /// 1 at `from`, 0 at `to`, linear between.
 float Ramp(float value, float from, float to) { return std::clamp((to - value) / (to - from), 0.0f, 1.0f); }
 
@@ -54,6 +58,9 @@ Atlas::Atlas(const SceneView& scene) : texel_m_(scene.membrane.texel_m) {
   };
   width_ = texels_of(extent.x());
   height_ = texels_of(extent.y());
+  film_width_ = (width_ + kFilmCell - 1) / kFilmCell;
+  film_height_ = (height_ + kFilmCell - 1) / kFilmCell;
+  film_.assign(2u * static_cast<std::size_t>(film_width_) * static_cast<std::size_t>(film_height_), 0);
   blocks_x_ = (width_ + kBlock - 1) / kBlock;
   covered_.assign(static_cast<std::size_t>(blocks_x_) * ((height_ + kBlock - 1) / kBlock), 0);
   touched_ = covered_;
@@ -79,6 +86,11 @@ AtlasRect Atlas::Apply(const TemperaturePatch& patch) {
     return {};
   }
   for (int row = 0; row < rect.height; ++row) {
+    const std::uint8_t* after = patch.texels.data() + 4 * static_cast<std::size_t>(row) * kPatchTexels + 3;
+    const std::uint8_t* before = texels_.data() + 4 * TexelIndex(x, y + row, width_) + 3;
+    for (int column = 0; column < rect.width; ++column) {
+      if (after[4 * column] < 128 && before[4 * column] >= 128) MarkRim(x + column, y + row);
+    }
     std::memcpy(texels_.data() + 4 * TexelIndex(x, y + row, width_),
                 patch.texels.data() + 4 * static_cast<std::size_t>(row) * kPatchTexels,
                 4 * static_cast<std::size_t>(rect.width));
@@ -88,45 +100,51 @@ AtlasRect Atlas::Apply(const TemperaturePatch& patch) {
       covered_[TexelIndex(bx, by, blocks_x_)] = 1;
     }
   }
-  Compose(rect);
   Touch(rect);
   return rect;
 }
 
-AtlasRect Atlas::Stain(const Vec2f& material, float radius_m, float thickness) {
-  blood_.resize(texels_.size() / 4, 0);
-  const Vec2f low = (material.array() - radius_m).matrix() / texel_m_;
-  const Vec2f high = (material.array() + radius_m).matrix() / texel_m_;
-  const int x0 = std::max(0, static_cast<int>(low.x())), x1 = std::min(width_ - 1, static_cast<int>(high.x()));
-  const int y0 = std::max(0, static_cast<int>(low.y())), y1 = std::min(height_ - 1, static_cast<int>(high.y()));
+bool Atlas::Stain(const Vec2f& material, float radius_m, float thickness) {
+  const float cell = kFilmCell * texel_m_;
+  const Vec2f low = (material.array() - radius_m).matrix() / cell, high = (material.array() + radius_m).matrix() / cell;
+  const int x0 = std::max(0, static_cast<int>(low.x())), x1 = std::min(film_width_ - 1, static_cast<int>(high.x()));
+  const int y0 = std::max(0, static_cast<int>(low.y())), y1 = std::min(film_height_ - 1, static_cast<int>(high.y()));
   if (x1 < x0 || y1 < y0) {
-    return {};
+    return false;
   }
   for (int y = y0; y <= y1; ++y) {
     for (int x = x0; x <= x1; ++x) {
-      const Vec2f p((static_cast<float>(x) + 0.5f) * texel_m_, (static_cast<float>(y) + 0.5f) * texel_m_);
+      const Vec2f p((static_cast<float>(x) + 0.5f) * cell, (static_cast<float>(y) + 0.5f) * cell);
       const float r2 = (p - material).squaredNorm() / (radius_m * radius_m);
-      const auto blood = static_cast<std::uint8_t>(127 * thickness * std::max(0.0f, 1 - r2 * r2));
-      std::uint8_t& here = blood_[TexelIndex(x, y, width_)];
-      here = std::max(here, blood);
+      Raise(255 * thickness * std::max(0.0f, 1 - r2), &film_[2 * TexelIndex(x, y, film_width_)]);
     }
   }
-  const AtlasRect rect{x0, y0, x1 - x0 + 1, y1 - y0 + 1};
-  Compose(rect);
-  return rect;
+  film_change_ = film_change_.United({x0, y0, x1 - x0 + 1, y1 - y0 + 1});
+  return true;
 }
 
-void Atlas::Compose(const AtlasRect& rect) {
-  if (blood_.empty()) {
-    return;
-  }
-  for (int y = rect.y; y < rect.y + rect.height; ++y) {
-    for (int x = rect.x; x < rect.x + rect.width; ++x) {
-      const std::size_t index = TexelIndex(x, y, width_);
-      std::uint8_t& alive = texels_[4 * index + 3];
-      alive = static_cast<std::uint8_t>(alive >= 128 ? 255 - blood_[index] : blood_[index]);
+float Atlas::Blood(const Vec2f& material) const {
+  const float cell = kFilmCell * texel_m_;
+  const int x = static_cast<int>(std::floor(material.x() / cell)),
+            y = static_cast<int>(std::floor(material.y() / cell));
+  if (x < 0 || y < 0 || x >= film_width_ || y >= film_height_) return 0;
+  return static_cast<float>(film_[2 * TexelIndex(x, y, film_width_)]) / 255;
+}
+
+/// Marks what lies beside the removed texel (x, y).
+void Atlas::MarkRim(int x, int y) {
+  const float cell = kFilmCell * texel_m_;
+  const Vec2f texel((static_cast<float>(x) + 0.5f) * texel_m_, (static_cast<float>(y) + 0.5f) * texel_m_);
+  const int reach = static_cast<int>(kRim_m / cell) + 1;
+  const int x0 = std::max(0, x / kFilmCell - reach), x1 = std::min(film_width_ - 1, x / kFilmCell + reach);
+  const int y0 = std::max(0, y / kFilmCell - reach), y1 = std::min(film_height_ - 1, y / kFilmCell + reach);
+  for (int v = y0; v <= y1; ++v) {
+    for (int u = x0; u <= x1; ++u) {
+      const Vec2f p((static_cast<float>(u) + 0.5f) * cell, (static_cast<float>(v) + 0.5f) * cell);
+      Raise(255 * Ramp((p - texel).norm(), 0, kRim_m), &film_[2 * TexelIndex(u, v, film_width_) + 1]);
     }
   }
+  film_change_ = film_change_.United({x0, y0, x1 - x0 + 1, y1 - y0 + 1});
 }
 
 std::optional<std::array<std::uint8_t, 4>> Atlas::At(const Vec2f& material) const {
@@ -221,18 +239,15 @@ AtlasRect Atlas::PaintCapsule(const Vec2f& a, const Vec2f& b) {
       const Vec2f p((static_cast<float>(x) + 0.5f) * texel_m_, (static_cast<float>(y) + 0.5f) * texel_m_);
       const float d = DistanceToSegment(p, a, b);
       std::uint8_t* texel = texels_.data() + 4 * TexelIndex(x, y, width_);
-      const auto raise = [](std::uint8_t* byte, float value) {
-        *byte = std::max(*byte, static_cast<std::uint8_t>(std::lround(value)));
-      };
-      raise(texel + 1, 255 * Ramp(d, kBrown, kBlanched));
-      raise(texel + 2, 128 * Ramp(d, kChar, kBrown) + 127 * Ramp(d, kSlit, kChar));
-      if (d < kSlit) {
-        texel[3] = 0;  // Compose adds the blood.
+      Raise(255 * Ramp(d, kBrown, kBlanched), texel + 1);
+      Raise(128 * Ramp(d, kChar, kBrown) + 127 * Ramp(d, kSlit, kChar), texel + 2);
+      if (d < kSlit && texel[3] >= 128) {
+        texel[3] = 0;
+        MarkRim(x, y);
       }
     }
   }
   const AtlasRect rect{x0, y0, x1 - x0 + 1, y1 - y0 + 1};
-  Compose(rect);
   Touch(rect);
   return rect;
 }

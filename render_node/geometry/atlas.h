@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "services/base/core/scene_view.h"
@@ -35,9 +36,20 @@ class Atlas {
   AtlasRect PaintCuts(const SceneView& scene, const TopologyState& topology);
 
   /// Adds blood on a disc of `radius_m` around (s, t) [m], with `thickness` 0 … 1 in its middle; thicker existing blood
-  /// is kept. Blood is stored in the low seven bits of the fourth byte and is independent of the patches: 255 - blood
-  /// for intact texels, blood for removed ones. Returns the changed rectangle.
-  AtlasRect Stain(const Vec2f& material, float radius_m, float thickness);
+  /// is kept. Blood is independent of the patches. Returns whether the disc lies on the atlas.
+  bool Stain(const Vec2f& material, float radius_m, float thickness);
+
+  /// The film: two bytes per 2 x 2 texels, row by row as the texels. First the thickness of the blood; second the
+  /// nearness of removed tissue, 255 where there is some and 0 from kRim_m on. In a map of its own, because it is
+  /// interpolated between texels, which may be removed on one side only.
+  [[nodiscard]] std::span<const std::uint8_t> film() const { return film_; }
+  [[nodiscard]] int film_width() const { return film_width_; }
+  [[nodiscard]] int film_height() const { return film_height_; }
+  /// Thickness of the blood at (s, t) [m], 0 … 1; 0 outside the sheet.
+  [[nodiscard]] float Blood(const Vec2f& material) const;
+  /// Rectangle of the film, in its own units, that has changed since the last call.
+  AtlasRect TakeFilmChange() { return std::exchange(film_change_, {}); }
+  static constexpr float kRim_m = 0.0020f;
 
   /// Texel at (s, t) [m]; no value outside the sheet.
   [[nodiscard]] std::optional<std::array<std::uint8_t, 4>> At(const Vec2f& material) const;
@@ -58,7 +70,7 @@ class Atlas {
 
  private:
   [[nodiscard]] bool Covered(int x, int y) const;
-  void Compose(const AtlasRect& rect);
+  void MarkRim(int x, int y);
   void Touch(const AtlasRect& rect);
   AtlasRect PaintCapsule(const Vec2f& a, const Vec2f& b);
 
@@ -67,8 +79,11 @@ class Atlas {
   int height_;
   int blocks_x_;
   std::vector<std::uint8_t> texels_;
+  int film_width_;
+  int film_height_;
+  std::vector<std::uint8_t> film_;
+  AtlasRect film_change_;
   std::vector<std::uint8_t> covered_;  // Per block of kBlock x kBlock texels.
-  std::vector<std::uint8_t> blood_;    // Per texel, 0 … 127; empty until the first call of Stain().
   std::vector<std::uint8_t> touched_;  // Per block.
   std::uint64_t touches_ = 0;
   std::vector<std::uint8_t> painted_;  // Per membrane triangle: bits of the dead edges that are already drawn.

@@ -17,14 +17,14 @@ constexpr int kRim = 16;        // Number of points around a cut that are checke
 constexpr float kRimRadii[] = {0.0005f, 0.0008f};  // [m]
 constexpr float kVessel = 0.75f;                   // Of the pattern: from 0.5 on, a slit of 30 mm bled in six places.
 constexpr std::uint8_t kSealed = 128;
-constexpr float kRun_m = 0.024f;
+constexpr float kRun_m = 0.020f;
 constexpr float kSpeed_m_s = 0.009f;  // On a vertical wall.
 constexpr float kLeastSlope = 0.15f;  // Lower limit of the slope: a film also creeps on a horizontal surface.
 constexpr float kSameVessel_m = 0.006f;
-constexpr float kPool_m = 0.0018f;  // Radius at the source.
+constexpr float kPool_m = 0.0018f;  // Radius at the source and where a drop stops.
 constexpr float kDrop_m = 0.0012f;  // Radius of a full drop.
 constexpr float kStray = 0.4f;      // [rad]
-constexpr float kThick = 1.0f, kThin = 0.6f;
+constexpr float kThick = 1.0f, kMiddle = 0.6f, kThin = 0.35f;
 
 }  // namespace
 
@@ -81,8 +81,8 @@ int Bleeding::drops() const {
   return static_cast<int>(std::count_if(drops_.begin(), drops_.end(), [](const Drop& d) { return d.left_m > 0; }));
 }
 
-AtlasRect Bleeding::Update(double session_time_s, const MembraneMesh& membrane, Atlas* atlas) {
-  AtlasRect changed;
+bool Bleeding::Update(double session_time_s, const MembraneMesh& membrane, Atlas* atlas) {
+  bool changed = false;
   if (sources() == 0 && drops() == 0) {
     return changed;
   }
@@ -90,26 +90,26 @@ AtlasRect Bleeding::Update(double session_time_s, const MembraneMesh& membrane, 
   for (; time_s_ + kStep_s <= session_time_s; time_s_ += kStep_s) {
     for (Source& source : sources_) {
       if (source.open) {
-        changed = changed.United(Bleed(&source, atlas));
+        changed |= Bleed(&source, atlas);
       }
     }
     for (Drop& drop : drops_) {
       if (drop.left_m > 0) {
-        changed = changed.United(Run(&drop, membrane.positions(), atlas));
+        changed |= Run(&drop, membrane.positions(), atlas);
       }
     }
   }
   return changed;
 }
 
-AtlasRect Bleeding::Bleed(Source* source, Atlas* atlas) {
+bool Bleeding::Bleed(Source* source, Atlas* atlas) {
   const auto texel = atlas->At(source->material);
   if (!texel || (*texel)[3] < 128 || (*texel)[1] >= kSealed || source->steps >= kClots_s / kStep_s) {
     source->open = false;
-    return {};
+    return false;
   }
   if (source->steps++ % kDropEvery != 0) {
-    return {};
+    return false;
   }
   drops_[next_drop_] = {kRun_m, source->material, source->node, 2.39996f * static_cast<float>(next_drop_)};
   next_drop_ = (next_drop_ + 1) % drops_.size();
@@ -117,7 +117,7 @@ AtlasRect Bleeding::Bleed(Source* source, Atlas* atlas) {
   return atlas->Stain(source->material, grown * kPool_m, kThick);
 }
 
-AtlasRect Bleeding::Run(Drop* drop, std::span<const Vec3f> positions, Atlas* atlas) {
+bool Bleeding::Run(Drop* drop, std::span<const Vec3f> positions, Atlas* atlas) {
   const Vec2f downhill = Downhill(drop->node, positions);
   const float slope = downhill.norm();
   const float travel = static_cast<float>(kStep_s) * kSpeed_m_s * std::max(slope, kLeastSlope);
@@ -128,8 +128,10 @@ AtlasRect Bleeding::Run(Drop* drop, std::span<const Vec3f> positions, Atlas* atl
   }
   drop->left_m -= travel;
   drop->node = NearestNode(drop->material, drop->node);
-  const float full = std::max(0.0f, drop->left_m / kRun_m);
-  return atlas->Stain(drop->material, (0.5f + 0.5f * full) * kDrop_m, kThin + (kThick - kThin) * full);
+  // It leaves a thin film, and what is left of it gathers where it stops.
+  if (drop->left_m <= 0) return atlas->Stain(drop->material, 1.2f * kPool_m, kThick);
+  const float uneven = 0.8f + 0.2f * std::sin(2100 * drop->material.y() + drop->phase);
+  return atlas->Stain(drop->material, uneven * kDrop_m, kThin + (kMiddle - kThin) * drop->left_m / kRun_m);
 }
 
 // Walks to the neighbour nearest to the target until none is nearer; this works because s and t increase monotonically

@@ -23,8 +23,8 @@ class Bleeding {
   void Cut(const Vec2f& material, const Atlas& atlas, double session_time_s);
 
   /// Moves the drops, stains the atlas, and closes sources that heat has sealed (damage above a half, or tissue
-  /// removed) or that have bled for 8 s. Returns the changed rectangle.
-  AtlasRect Update(double session_time_s, const MembraneMesh& membrane, Atlas* atlas);
+  /// removed) or that have bled for 8 s. Returns whether the film of the atlas has changed.
+  bool Update(double session_time_s, const MembraneMesh& membrane, Atlas* atlas);
 
   [[nodiscard]] int sources() const;
   [[nodiscard]] int drops() const;
@@ -45,8 +45,8 @@ class Bleeding {
   [[nodiscard]] float VesselAt(const Vec2f& material) const;
   [[nodiscard]] Index NearestNode(const Vec2f& material, Index start) const;
   [[nodiscard]] Vec2f Downhill(Index node, std::span<const Vec3f> positions) const;
-  AtlasRect Bleed(Source* source, Atlas* atlas);
-  AtlasRect Run(Drop* drop, std::span<const Vec3f> positions, Atlas* atlas);
+  bool Bleed(Source* source, Atlas* atlas);
+  bool Run(Drop* drop, std::span<const Vec3f> positions, Atlas* atlas);
 
   SceneView scene_;
   std::span<const std::uint8_t> vessels_;

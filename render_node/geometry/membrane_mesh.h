@@ -58,6 +58,10 @@ class MembraneMesh {
 
   /// True if the node is vaporised, part of a crumb or of no sheet.
   [[nodiscard]] bool node_gone(Index node) const { return gone_[node] != 0; }
+  /// True if the edge from the node to the next column (0), row (1) or both (2) is dead. @pre the edge exists.
+  [[nodiscard]] bool edge_severed(Index node, std::size_t direction) const {
+    return TestBit(dead_edges_, 3 * std::size_t{node} + direction);
+  }
 
  private:
   struct Part {

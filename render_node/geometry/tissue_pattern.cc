@@ -1,7 +1,6 @@
 #include "render_node/geometry/tissue_pattern.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -57,12 +56,6 @@ void AddValueNoise(int size, int cells, float amplitude, Uniform* uniform, std::
   }
 }
 
-/// Distance on the unit torus between two coordinates.
-float Wrapped(float a, float b) {
-  const float d = std::abs(a - b);
-  return std::min(d, 1 - d);
-}
-
 /// Rounds to nearest, halves up; std::lround would be a function call per texel.
 std::uint8_t ToByte(float value) {
   return static_cast<std::uint8_t>(static_cast<int>(2 * std::clamp(value, 0.0f, 255.0f) + 1) / 2);
@@ -84,37 +77,107 @@ std::vector<std::uint8_t> MakeNoises(int size, std::uint32_t seed) {
   return image;
 }
 
+/// Adds rounded cells, about `cells` a side, that rise by `amplitude` from the clefts between them to a square field.
+/// `tone`: a value 0 … 1 of the nearest cell, mixed in the clefts.
+void AddCells(int size, int cells, float amplitude, Uniform* uniform, std::vector<float>* field,
+              std::vector<float>* tone) {
+  struct Centre {
+    float u, v, tone;
+  };
+  const auto count = static_cast<std::size_t>(cells);
+  std::vector<Centre> centres;
+  for (std::size_t k = 0; k < count * count; ++k) {
+    const float u = static_cast<float>(k % count) + 0.1f + 0.8f * (*uniform)();
+    const float v = static_cast<float>(k / count) + 0.1f + 0.8f * (*uniform)();
+    centres.push_back({u, v, (*uniform)()});
+  }
+  for (int y = 0; y < size; ++y) {
+    for (int x = 0; x < size; ++x) {
+      // In units of a cell.
+      const float u = (static_cast<float>(x) + 0.5f) * static_cast<float>(cells) / static_cast<float>(size);
+      const float v = (static_cast<float>(y) + 0.5f) * static_cast<float>(cells) / static_cast<float>(size);
+      float nearest = 99, second = 99;  // Squared.
+      float own = 0, other = 0;
+      for (int dy = -2; dy <= 2; ++dy) {
+        for (int dx = -2; dx <= 2; ++dx) {
+          const int column = static_cast<int>(u) + dx, row = static_cast<int>(v) + dy;
+          const int wrapped_x = (column + cells) % cells, wrapped_y = (row + cells) % cells;
+          const Centre& centre = centres[TexelIndex(wrapped_x, wrapped_y, cells)];
+          const float du = u - (centre.u + static_cast<float>(column - wrapped_x));
+          const float dv = v - (centre.v + static_cast<float>(row - wrapped_y));
+          const float d = du * du + dv * dv;
+          if (d < nearest) {
+            second = nearest;
+            other = own;
+            nearest = d;
+            own = centre.tone;
+          } else if (d < second) {
+            second = d;
+            other = centre.tone;
+          }
+        }
+      }
+      // Round, steepest at the cleft.
+      const float inside = std::min(1.0f, 1.1f * (std::sqrt(second) - std::sqrt(nearest)));
+      const float rise = 1 - (1 - inside) * (1 - inside);
+      const std::size_t texel = TexelIndex(x, y, size);
+      (*field)[texel] += amplitude * rise;
+      if (tone != nullptr) (*tone)[texel] = own + (other - own) * 0.5f * (1 - SmoothStep(std::min(1.0f, 4 * inside)));
+    }
+  }
+}
+
+/// Mean over squares of 2 * reach + 1 texels, twice: the clefts become round as well.
+void Blur(int size, int reach, std::vector<float>* field) {
+  std::vector<float> line(static_cast<std::size_t>(size));
+  for (int pass = 0; pass < 4; ++pass) {
+    for (int k = 0; k < size; ++k) {
+      const auto at = [&](int i) -> float& {
+        const int wrapped = (i + size) % size;
+        return (*field)[pass % 2 == 0 ? TexelIndex(wrapped, k, size) : TexelIndex(k, wrapped, size)];
+      };
+      for (int i = 0; i < size; ++i) {
+        float sum = 0;
+        for (int j = i - reach; j <= i + reach; ++j) sum += at(j);
+        line[static_cast<std::size_t>(i)] = sum / static_cast<float>(2 * reach + 1);
+      }
+      for (int i = 0; i < size; ++i) at(i) = line[static_cast<std::size_t>(i)];
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> MakeNoisePattern(int size, std::uint32_t seed) {
   std::vector<std::uint8_t> image = MakeNoises(size, seed);
-  // Lobules: distance to the second nearest minus distance to the nearest of jittered centres.
-  constexpr int kCells = 9;
+  for (std::size_t i = 3; i < image.size(); i += 4) image[i] = 255;
+  return image;
+}
+
+std::vector<std::uint8_t> MakeFatPattern(int size, std::uint32_t seed) {
+  constexpr float kLarge_m = 8e-4f,
+                  kSmall_m = 2.5e-4f;  // Heights of lobules and of the small ones that they consist of.
+  const std::size_t texels = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
+  std::vector<float> height(texels, 0.0f), tone(texels);
   Uniform uniform(5 + kSeedStep * seed);
-  std::array<std::array<float, 2>, kCells * kCells> centres;
-  for (int y = 0; y < kCells; ++y) {
-    for (int x = 0; x < kCells; ++x) {
-      const float u = static_cast<float>(x) + uniform(), v = static_cast<float>(y) + uniform();
-      centres[TexelIndex(x, y, kCells)] = {u / kCells, v / kCells};
-    }
-  }
+  AddCells(size, kFatLobules, kLarge_m, &uniform, &height, &tone);
+  AddCells(size, 5 * kFatLobules / 2, kSmall_m, &uniform, &height, nullptr);
+  Blur(size, size / 100, &height);
+  const std::vector<std::uint8_t> vessels = MakeVesselPattern(size, seed + 53);
+  std::vector<std::uint8_t> image(4 * texels);
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
-      const float u = (static_cast<float>(x) + 0.5f) / size, v = (static_cast<float>(y) + 0.5f) / size;
-      float nearest = 9, second = 9;  // Squared.
-      for (int dy = -2; dy <= 2; ++dy) {
-        for (int dx = -2; dx <= 2; ++dx) {
-          const int cx = (static_cast<int>(u * kCells) + dx + kCells) % kCells;
-          const int cy = (static_cast<int>(v * kCells) + dy + kCells) % kCells;
-          const auto& centre = centres[TexelIndex(cx, cy, kCells)];
-          const float du = Wrapped(u, centre[0]), dv = Wrapped(v, centre[1]);
-          const float d = du * du + dv * dv;
-          second = std::min(second, std::max(d, nearest));
-          nearest = std::min(nearest, d);
-        }
-      }
-      image[4 * TexelIndex(x, y, size) + 3] =
-          ToByte(255 * SmoothStep(std::min(1.0f, 1.6f * kCells * (std::sqrt(second) - std::sqrt(nearest)))));
+      const auto at = [&](int dx, int dy) {
+        return height[TexelIndex((x + dx + size) % size, (y + dy + size) % size, size)];
+      };
+      const std::size_t i = TexelIndex(x, y, size);
+      const float two_texels_m = 2 * kFatPeriod_m / static_cast<float>(size);
+      image[4 * i] = ToByte(128 + 64 * (at(1, 0) - at(-1, 0)) / two_texels_m);
+      image[4 * i + 1] = ToByte(128 + 64 * (at(0, 1) - at(0, -1)) / two_texels_m);
+      image[4 * i + 2] = ToByte(255 * at(0, 0) / (kLarge_m + kSmall_m));
+      // Vessels lie in the clefts and fade on the lobules.
+      const float vessel = static_cast<float>(vessels[i]) / 255 * (1.5f - 0.8f * at(0, 0) / kLarge_m);
+      image[4 * i + 3] = ToByte((1 - std::clamp(vessel, 0.0f, 1.0f)) * (128 + 127 * tone[i]));
     }
   }
   return image;

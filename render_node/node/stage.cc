@@ -7,7 +7,6 @@
 
 #include "render_node/node/drawing_threads.h"
 #include "render_node/node/hud.h"
-#include "services/base/core/solid_charts.h"
 
 namespace fulcrum::render {
 namespace {
@@ -34,10 +33,9 @@ void WarmUp(const SceneView& scene, Stage* stage) {
   constexpr float kFewPixels = 0.25f;
   view.SetScale(kFewPixels);
   Bitmap picture;
-  const bool burns = SolidsBurn(scene);
-  if (burns) view.RehearseBurn(true);
+  view.RehearseBurn(true);
   stage->display->DrawAndRead(&picture);
-  if (burns) view.RehearseBurn(false);
+  view.RehearseBurn(false);
   if (FindTool(scene.tools, ToolKind::kScope)) {
     view.SetSoil(1);
     stage->display->DrawAndRead(&picture);

@@ -12,8 +12,8 @@ namespace fulcrum::render {
 
 class AtlasTexture {
  public:
-  /// Keeps a reference to `texels`: 4 * width * height bytes, row by row.
-  AtlasTexture(int width, int height, std::span<const std::uint8_t> texels);
+  /// Keeps a reference to `texels`: `channels` (2 or 4) * width * height bytes, row by row.
+  AtlasTexture(int width, int height, std::span<const std::uint8_t> texels, int channels = 4);
   /// Keeps a reference to the texels of `atlas`.
   explicit AtlasTexture(const Atlas& atlas) : AtlasTexture(atlas.width(), atlas.height(), atlas.texels()) {}
   ~AtlasTexture();

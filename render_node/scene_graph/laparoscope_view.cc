@@ -64,7 +64,7 @@ struct LaparoscopeView::Impl {
   Laparoscope scope;  // With stereo in the middle of the eyes.
   std::vector<Laparoscope> eyes;
   Atlas atlas;
-  AtlasTexture atlas_texture;
+  AtlasTexture atlas_texture, film_texture;
   TissueLayers layers;
   Surroundings surroundings;
   Instruments instruments;
@@ -97,6 +97,7 @@ LaparoscopeView::Impl::Impl(const SceneView& view, const Look& given)
       eyes(MakeEyes(view.render, view.stereo)),
       atlas(view),
       atlas_texture(atlas),
+      film_texture(atlas.film_width(), atlas.film_height(), atlas.film(), 2),
       layers(view, eyes),
       surroundings(view, scope, look),
       instruments(view),
@@ -140,6 +141,9 @@ void LaparoscopeView::Impl::BindTextures() {
     state->addUniform(new osg::Uniform(name, static_cast<int>(unit)));
   };
   bind(kAtlasUnit, "atlas", atlas_texture.texture());
+  bind(kFilmUnit, "film_map", film_texture.texture());
+  bind(kFatUnit, "fat_pattern",
+       MakeTexture(kNoiseTexels, kNoiseTexels, 4, MakeFatPattern(kNoiseTexels, look.patterns), true));
   noise = MakeNoisePattern(kNoiseTexels, look.patterns);
   structures = map;
   bind(kNoiseUnit, "noise_pattern", MakeTexture(kNoiseTexels, kNoiseTexels, 4, noise, true));
@@ -149,6 +153,10 @@ void LaparoscopeView::Impl::BindTextures() {
   state->addUniform(new osg::Uniform("behind", 0.0f));
   state->addUniform(new osg::Uniform("shift", osg::Vec3(0, 0, 0)));
   state->addUniform(new osg::Uniform("atlas_per_metre", osg::Vec2(1 / size.x(), 1 / size.y())));
+  const float film_texel = 2 * atlas.texel_m();
+  state->addUniform(
+      new osg::Uniform("film_per_metre", osg::Vec2(1 / (film_texel * static_cast<float>(atlas.film_width())),
+                                                   1 / (film_texel * static_cast<float>(atlas.film_height())))));
   state->addUniform(new osg::Uniform("light_axis", vec3(scope.light_axis)));
   optics.SetLight(look.light);
   state->addUniform(new osg::Uniform("light_colour", vec3(look.light)));
@@ -175,7 +183,7 @@ void LaparoscopeView::Impl::PlaceEyes() {
   layers.SetEyes(eyes);
 }
 
-// Chooses the visible triangles of the fat: those that meet the condition of fat.frag with a margin, or are bared.
+// Chooses the visible triangles of the fat: those that meet the condition of fat.frag with a margin.
 void LaparoscopeView::Impl::ShowFat() {
   if (fat_touches == atlas.touches()) {
     return;
@@ -228,7 +236,7 @@ bool LaparoscopeView::SetTopology(const TopologyState& topology) {
     return false;
   }
   impl_->atlas_texture.Update(impl_->atlas.PaintCuts(impl_->scene, topology));
-  impl_->fat_touches = ~std::uint64_t{0};  // Pieces of the membrane may have been removed.
+  impl_->film_texture.Update(impl_->atlas.TakeFilmChange());
   return true;
 }
 
@@ -239,6 +247,7 @@ bool LaparoscopeView::ApplyPatch(const TemperaturePatch& patch) {
     const AtlasRect rect = impl_->atlas.Apply(patch);
     if (rect.empty()) return false;
     impl_->atlas_texture.Update(rect);
+    impl_->film_texture.Update(impl_->atlas.TakeFilmChange());
   }
   impl_->optics.SceneChanged();
   return true;
@@ -316,9 +325,9 @@ bool LaparoscopeView::UpdateEffects(double session_time_s) {
   const bool smoking = impl_->smoke.Update(session_time_s);
   impl_->haze = impl_->smoke.HazeAt(session_time_s);
   impl_->optics.SetHaze(impl_->haze);
-  const AtlasRect stained = impl_->bleeding.Update(session_time_s, impl_->layers.membrane(), &impl_->atlas);
-  impl_->atlas_texture.Update(stained);
-  const bool changed = smoking || !stained.empty();
+  const bool bled = impl_->bleeding.Update(session_time_s, impl_->layers.membrane(), &impl_->atlas);
+  impl_->film_texture.Update(impl_->atlas.TakeFilmChange());
+  const bool changed = smoking || bled;
   if (changed) {
     impl_->optics.SceneChanged();
   }

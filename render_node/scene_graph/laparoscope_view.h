@@ -41,7 +41,7 @@ class LaparoscopeView {
   void AddSmokeAt(const Vec3f& p_W, double session_time_s);
   /// Opens the vessels at a cut at (s, t) [m]; they bleed until heat closes them.
   void OpenVessels(const Vec2f& material, double session_time_s);
-  /// Adds a piece of burnt tissue to the picture, or removes it: its shader is compiled when it is drawn.
+  /// Adds what only a burn shows to the picture, or removes it: a shader is compiled when it is drawn.
   void RehearseBurn(bool on);
   /// Advances smoke and blood. Returns true if the picture changes or will change by that, but for the haze.
   bool UpdateEffects(double session_time_s);

@@ -10,8 +10,8 @@ namespace fulcrum::render {
 enum class Order { kBackground, kMask, kInstruments, kRectum, kSurroundings, kBurn, kFat, kMembrane, kShadow, kSmoke };
 
 /// Texture units; the samplers of all programs are bound once at the scene's root, but for the burns of solids, which
-/// most sessions do not have.
-enum TextureUnit { kAtlasUnit, kNoiseUnit, kSerosaUnit, kStructureUnit, kBurnUnit };
+/// most sessions do not have. Units 6 and 7 are those of optics.cc and overlay.cc.
+enum TextureUnit { kAtlasUnit, kNoiseUnit, kSerosaUnit, kStructureUnit, kBurnUnit, kFilmUnit, kFatUnit = 8 };
 
 inline void DrawIn(Order order, osg::StateSet* state) {
   state->setRenderBinDetails(static_cast<int>(order), "RenderBin");

@@ -9,6 +9,7 @@
 #include "render_node/geometry/surface.h"
 #include "render_node/scene_graph/program.h"
 #include "render_node/scene_graph/surroundings.h"
+#include "services/base/core/solid_charts.h"
 
 namespace fulcrum::render {
 namespace {
@@ -136,9 +137,12 @@ void TissueLayers::AddSolid(const fulcrum::Solid& solid) {
 }
 
 void TissueLayers::AddSheets() {
+  Add(&beneath_layer_, "fat beneath", Order::kFat, MakeProgram("surface.vert", "fat.frag", "BENEATH"));
   Add(&fat_layer_, "fat", Order::kFat, MakeProgram("surface.vert", "fat.frag"));
-  Blend(fat_layer_.mesh->state());
-  fat_layer_.mesh->state()->addUniform(new osg::Uniform("behind", kFatBehind));
+  for (const Layer* layer : {&beneath_layer_, &fat_layer_}) {
+    Blend(layer->mesh->state());
+    layer->mesh->state()->addUniform(new osg::Uniform("behind", kFatBehind));
+  }
   const bool printed = scene_.thermal.model == ThermalModel::kPaper && scene_.thermal.as == PaperForm::kPrinted;
   Add(&sheet_, "membrane", Order::kMembrane, MakeProgram("surface.vert", "membrane.frag", printed ? "AS_PRINTED" : ""));
   Blend(sheet_.mesh->state());
@@ -197,25 +201,21 @@ void TissueLayers::SetDetail(float factor) {
 
 void TissueLayers::ShowFat(const std::function<bool(const Vec2f& material, float thickness)>& visible,
                            const std::function<bool(const Vec2f& material)>& opened) {
-  fat_.FindBared(opened, membrane_, &fat_bared_);
-  std::vector<std::uint8_t> seen(fat_.materials().size());
-  std::vector<Float4> coordinates(seen.size());
-  for (std::size_t k = 0; k < seen.size(); ++k) {
-    const Vec2f& m = fat_.materials()[k];
-    seen[k] = fat_bared_[k] > 0 || visible(m, fat_.thickness()[k]) ? 1 : 0;
-    coordinates[k] = {m.x(), m.y(), fat_.thickness()[k], fat_bared_[k]};
+  fat_visible_.resize(fat_.materials().size());
+  fat_opened_.resize(fat_visible_.size());
+  for (std::size_t k = 0; k < fat_visible_.size(); ++k) {
+    fat_opened_[k] = opened(fat_.materials()[k]) ? 1 : 0;
+    fat_visible_[k] = visible(fat_.materials()[k], fat_.thickness()[k]) ? 1 : 0;
   }
-  fat_layer_.mesh->SetCoordinates(coordinates);
-  fat_shown_.clear();
-  for (const Triangle& t : fat_.triangles()) {
-    if (seen[t[0]] || seen[t[1]] || seen[t[2]]) {
-      fat_shown_.push_back(t);
-    }
-  }
+  fat_chosen_ = false;
   topology_changed_ = true;
 }
 
 void TissueLayers::RehearseBurn(bool on) {
+  rehearsing_ = on;
+  fat_chosen_ = false;
+  UpdateFat();
+  if (!SolidsBurn(scene_)) return;
   if (!on) {
     burn_.EndRehearsal(geode_);
     return;
@@ -273,10 +273,38 @@ void TissueLayers::UpdateMembrane() {
 }
 
 void TissueLayers::UpdateFat() {
+  if (topology_changed_) fat_.FindCuts(membrane_);
   fat_.Update(xyz_, membrane_);
-  fat_layer_.mesh->SetPositions(fat_.positions());
-  fat_layer_.mesh->SetNormals(fat_.normals());
+  for (const Layer* layer : {&beneath_layer_, &fat_layer_}) {
+    layer->mesh->SetPositions(fat_.positions());
+    layer->mesh->SetNormals(fat_.normals());
+  }
+  if (!fat_chosen_ || !std::ranges::equal(fat_.bared(), fat_bared_)) ChooseFat();
+  Show(&beneath_layer_, fat_.positions(), fat_beneath_, Sides::kBoth);
   Show(&fat_layer_, fat_.positions(), fat_shown_, Sides::kBoth);
+}
+
+void TissueLayers::ChooseFat() {
+  const std::span<const float> bared = fat_.bared();
+  fat_coordinates_.resize(bared.size());
+  for (std::size_t k = 0; k < bared.size(); ++k) {
+    const Vec2f& m = fat_.materials()[k];
+    fat_coordinates_[k] = {m.x(), m.y(), fat_.thickness()[k], bared[k]};
+  }
+  beneath_layer_.mesh->SetCoordinates(fat_coordinates_);
+  fat_layer_.mesh->SetCoordinates(fat_coordinates_);
+  const auto open = [&](Index k) { return rehearsing_ || bared[k] > 0 || fat_opened_[k] != 0; };
+  fat_shown_.clear();
+  fat_beneath_.clear();
+  for (const Triangle& t : fat_.triangles()) {
+    if (open(t[0]) || open(t[1]) || open(t[2])) {
+      fat_shown_.push_back(t);
+    } else if (fat_visible_[t[0]] != 0 || fat_visible_[t[1]] != 0 || fat_visible_[t[2]] != 0) {
+      fat_beneath_.push_back(t);
+    }
+  }
+  fat_chosen_ = true;
+  fat_bared_.assign(bared.begin(), bared.end());
 }
 
 void TissueLayers::Show(Layer* layer, std::span<const Vec3f> positions, std::span<const Triangle> triangles,

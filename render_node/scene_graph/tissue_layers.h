@@ -34,11 +34,12 @@ class TissueLayers {
   void SetEyes(std::span<const Laparoscope> eyes);
   /// Draws the membrane in so many triangles as a picture with `factor` times as many lines needs; 1 at first.
   void SetDetail(float factor);
-  /// Draws a triangle of the fat if one of its corners is `visible`, as a function of (s, t) [m] and thickness 0 … 1,
-  /// or is bared because the sheet above is `opened`.
+  /// Draws a triangle of the fat if one of its corners is bared, `opened` or `visible`, as a function of (s, t) [m] and
+  /// thickness 0 … 1; with lobules if one is bared or opened.
   void ShowFat(const std::function<bool(const Vec2f& material, float thickness)>& visible,
                const std::function<bool(const Vec2f& material)>& opened);
-  /// Adds a piece of burnt tissue in front of everything, or removes it: see BurnLayer::Rehearse.
+  /// Adds what only a burn shows, so that its shaders are compiled, or removes it: all fat as bared and, where solids
+  /// burn, a piece of burnt tissue in front of everything (BurnLayer::Rehearse).
   void RehearseBurn(bool on);
   /// Updates the meshes. Returns false if nothing has changed.
   bool Update();
@@ -70,6 +71,7 @@ class TissueLayers {
   void UpdateSolids();
   void UpdateMembrane();
   void UpdateFat();
+  void ChooseFat();
 
   SceneView scene_;
   FieldOfView field_;
@@ -81,8 +83,11 @@ class TissueLayers {
   FatLayer fat_;
   std::vector<float> xyz_;
   std::vector<Vec3f> solid_positions_, solid_normals_;  ///< Of all solids.
-  std::vector<Triangle> fat_shown_;
-  std::vector<float> fat_bared_;
+  std::vector<Triangle> fat_shown_, fat_beneath_;       ///< With lobules; as a tint beneath the membrane.
+  std::vector<std::uint8_t> fat_visible_, fat_opened_;  ///< Per vertex.
+  std::vector<std::array<float, 4>> fat_coordinates_;
+  std::vector<float> fat_bared_;  ///< As drawn.
+  bool fat_chosen_ = false, rehearsing_ = false;
   std::vector<Triangle> chosen_;  // Scratch: triangles of the membrane at the level of detail that is needed.
   const std::vector<float> rim_;  // Per node of the membrane's grid (geometry/sheet_rim.h).
   bool tissue_changed_ = true, topology_changed_ = true, scope_changed_ = true;
@@ -90,7 +95,7 @@ class TissueLayers {
   osg::ref_ptr<osg::Program> solid_program_;  ///< Of all solids: the rasteriser compiles each program.
   std::vector<SolidLayer> solids_;
   BurnLayer burn_;
-  Layer fat_layer_, sheet_;
+  Layer fat_layer_, beneath_layer_, sheet_;
 };
 
 }  // namespace fulcrum::render

@@ -38,7 +38,7 @@ vec3 ShadeTissue(vec3 albedo, vec3 scatter, vec3 normal, vec3 film, vec3 positio
   float side = sign(dot(normal, v));
   vec3 diffuse = clamp((side * dot(normal, l) + scatter) / (1.0 + scatter), 0.0, 1.0);
   // Light and eye are only 4 mm apart, so the light's direction is used as the half vector.
-  gloss = e * wet * (Highlight(side * dot(film, l), 0.14, 1.9) +
+  gloss = e * wet * (Highlight(side * dot(film, l), 0.16, 2.4) +
                      Highlight(side * dot(film, normalize(wall_direction + v)), 0.07, 0.45));
   // Indirect light from the rest of the cavity is red.
   return e * (albedo * diffuse) + gloss * vec3(1.0, 0.96, 0.92) + albedo * vec3(0.030, 0.014, 0.012);
@@ -49,25 +49,16 @@ vec3 AroundTheSheet(vec3 colour, float fat, vec4 noise) {
   return mix(colour * (0.6 + 0.8 * noise.r), vec3(0.80, 0.46, 0.16), fat * smoothstep(0.35, 0.95, noise.g));
 }
 
-// Blood is the low bits of the atlas' fourth channel (geometry/atlas.h): interpolated here, because values between
-// closed and open texels would look like blood.
-uniform sampler2D atlas;
+// The film on the sheet (geometry/atlas.h): thickness of the blood, nearness of removed tissue.
+uniform sampler2D film_map;
+uniform vec2 film_per_metre; // Coordinates of film_map per metre of material.
 
-float BloodOf(ivec2 texel) {
-  float own = texelFetch(atlas, clamp(texel, ivec2(0), textureSize(atlas, 0) - 1), 0).a;
-  return own < 0.5 ? 2.0 * own : 2.0 - 2.0 * own;
+// Tissue seen through a film of blood, by Beer and Lambert: haemoglobin absorbs blue and green long before red, so thin
+// blood is bright and thick blood dark. Blood scatters a little light itself.
+vec3 ThroughBlood(vec3 albedo, float thickness) {
+  vec3 passed = exp2(-thickness * vec3(3.0, 11.0, 12.0));
+  return albedo * passed + (1.0 - passed.g) * vec3(0.060, 0.004, 0.004);
 }
-
-float BloodAt(vec2 place) {
-  vec2 at = place * vec2(textureSize(atlas, 0)) - 0.5;
-  ivec2 low = ivec2(floor(at));
-  vec2 part = at - vec2(low);
-  return mix(mix(BloodOf(low), BloodOf(low + ivec2(1, 0)), part.x),
-             mix(BloodOf(low + ivec2(0, 1)), BloodOf(low + ivec2(1, 1)), part.x), part.y);
-}
-
-// A film of blood absorbs more where it is thicker.
-vec3 BloodColour(float thickness) { return mix(vec3(0.46, 0.020, 0.014), vec3(0.22, 0.004, 0.005), thickness); }
 
 // Metal: it reflects the lit cavity, red below and dark towards the scope.
 vec3 ShadeMetal(vec3 tint, vec3 normal, vec3 position) {

@@ -7,6 +7,7 @@
 in vec3 position;
 in vec3 normal;
 in vec4 coordinate;
+uniform sampler2D atlas;
 uniform sampler2D serosa_pattern;
 uniform vec2 atlas_per_metre;
 uniform float colour_by_temperature; // 1: the paper's eq. 15, a function of the present temperature.
@@ -60,6 +61,8 @@ void main() {
 #endif
   if (coordinate.z < 0.0 || max(heat.a, heat_below.a) < 0.5) discard;
   vec4 noise = texture(serosa_pattern, m * 16.0);
+  vec4 wet_film = texture(film_map, m * film_per_metre);
+  float edge = wet_film.g;
   float vessel = noise.a;
   float celsius = 20.0 + 127.5 * heat.r;
   float damage = heat.g;
@@ -69,7 +72,7 @@ void main() {
   float ink = PlannedInk(m);
   vec3 bend = noise.rgb - 0.5;
   vec3 n = normalize(normal + 0.12 * bend);
-  vec3 film = normalize(normal + 0.30 * bend + 0.34 * (texture(serosa_pattern, m * 57.0).rgb - 0.5));
+  vec3 film = normalize(normal + 0.40 * bend + 0.80 * (texture(serosa_pattern, m * 115.0).rgb - 0.5));
   float facing = abs(dot(n, normalize(position)));
   float grazing = (1.0 - facing) * (1.0 - facing);
   vec3 albedo = mix(vec3(0.84, 0.40, 0.30), vec3(0.90, 0.60, 0.45), noise.g);
@@ -100,12 +103,16 @@ void main() {
   float hot = colour_by_temperature * clamp((celsius - 45.0) / 55.0, 0.0, 1.0);
   albedo = mix(albedo, vec3(0.22, 0.075, 0.022), hot);
   alpha = mix(alpha, 0.95, hot);
+  // The rim of a slit draws back: thick, blanched, towards the cut tan.
+  float lip = smoothstep(0.42, 0.85, edge);
+  albedo = mix(albedo, mix(vec3(0.84, 0.64, 0.50), vec3(0.44, 0.22, 0.09), smoothstep(0.80, 0.97, edge + 0.35 * bend.z)), 0.8 * lip);
+  alpha = mix(alpha, 0.90, lip);
   // Blood lies on top and seeps away where the sheet ends.
-  float blood = heat.a < 0.97 ? BloodAt(m * atlas_per_metre) * (1.0 - smoothstep(0.5, 0.95, abs(coordinate.w))) : 0.0;
-  float bloody = smoothstep(0.15, 0.45, blood);
-  albedo = mix(albedo, BloodColour(blood), bloody);
+  float blood = wet_film.r * (1.0 - smoothstep(0.5, 0.95, abs(coordinate.w)));
+  float bloody = smoothstep(0.0, 0.35, blood);
+  albedo = ThroughBlood(albedo, blood);
   alpha = mix(alpha, 0.97, bloody);
-  film = normalize(mix(film, normal + 0.12 * bend, bloody));
+  film = normalize(mix(film, normal + 0.5 * bend, bloody));
 
   float wet = mix(1.6 * (1.0 - 0.92 * max(brown, 0.3 * pale)), 1.8, bloody);
 
@@ -121,7 +128,7 @@ void main() {
   // A line of sight that enters through the slit of the nearer layer and meets the farther one has met the wall of the
   // cut between the two.
   bool from_above = dot(normal, position) < 0.0;
-  vec4 raw = vec4(mix(mix(vec3(0.80, 0.52, 0.40), vec3(0.50, 0.26, 0.11), tanned), vec3(0.13, 0.05, 0.02), seared), 0.97);
+  vec4 raw = vec4(mix(mix(vec3(0.80, 0.52, 0.40), vec3(0.56, 0.33, 0.17), tanned), vec3(0.26, 0.12, 0.05), seared), 0.97);
   if (from_above && heat.a < 0.5) lower = raw;
   if (!from_above && heat_below.a < 0.5) upper = raw;
 #ifdef AS_PRINTED

@@ -42,7 +42,7 @@ class DrawTruth final : public osg::NodeVisitor {
   void apply(osg::Geode& geode) override {
     for (unsigned k = geode.getNumDrawables(); k-- > 0;) {
       const std::string name = geode.getDrawable(k)->getName();
-      if (name == "smoke" || name == "shadow") {
+      if (name == "smoke" || name == "shadow" || name == "fat beneath") {  // The last is never counted as fat.
         geode.removeDrawables(k);
       } else if (name != "field" && name != "overlay" && geode.getDrawable(k)->getStateSet() != nullptr) {
         Change(geode.getDrawable(k)->getStateSet(), name);

@@ -94,6 +94,38 @@ TEST_F(AtlasTest, ACutKnownFromTheTopologyAloneIsASlitWithABrownedRim) {
   EXPECT_TRUE(atlas_.PaintCuts(view_, topology_).empty()) << "painted twice";
 }
 
+TEST_F(AtlasTest, TheFilmTellsHowNearRemovedTissueIs) {
+  EXPECT_TRUE(atlas_.TakeFilmChange().empty());
+  TemperaturePatch patch = PatchAt(32, 64, 99);
+  for (std::size_t k = 3; k < patch.texels.size(); k += 4) patch.texels[k] = 255;
+  patch.texels[4 * (20 * kPatchTexels + 20) + 3] = 0;
+  const auto rim = [&](int x, int y) {
+    return atlas_.film()[2 * (static_cast<std::size_t>(y / 2) * static_cast<std::size_t>(atlas_.film_width()) +
+                              static_cast<std::size_t>(x / 2)) +
+                         1];
+  };
+  atlas_.Apply(patch);
+  EXPECT_GT(rim(52, 84), 235);
+  EXPECT_NEAR(rim(52 + 10, 84), 128, 16) << "1 of 2 mm away";
+  EXPECT_EQ(rim(52 + 24, 84), 0);
+  const AtlasRect changed = atlas_.TakeFilmChange();
+  EXPECT_LE(changed.x, 26 - 9);
+  EXPECT_GE(changed.x + changed.width, 26 + 9);
+  EXPECT_TRUE(atlas_.TakeFilmChange().empty());
+  atlas_.Apply(patch);
+  EXPECT_TRUE(atlas_.TakeFilmChange().empty()) << "nothing new";
+}
+
+TEST_F(AtlasTest, BloodIsIndependentOfPatches) {
+  const Vec2f place(0.005f, 0.008f);
+  EXPECT_TRUE(atlas_.Stain(place, 0.001f, 1));
+  EXPECT_NEAR(atlas_.Blood(place), 1, 0.05f);
+  EXPECT_EQ(atlas_.Blood(place + Vec2f(0.0013f, 0)), 0);
+  atlas_.Apply(PatchAt(32, 64, 99));
+  EXPECT_NEAR(atlas_.Blood(place), 1, 0.05f);
+  EXPECT_FALSE(atlas_.Stain(Vec2f(-1, -1), 0.001f, 1)) << "beside the sheet";
+}
+
 TEST_F(AtlasTest, WhatAPatchSaidIsNotPaintedOver) {
   const auto x = static_cast<std::uint32_t>(slit_.x() / atlas_.texel_m()),
              y = static_cast<std::uint32_t>(slit_.y() / atlas_.texel_m());

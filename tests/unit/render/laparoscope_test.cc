@@ -174,6 +174,34 @@ TEST(TissuePatternTest, IsTheSameInEveryRunAndNotFlat) {
   EXPECT_LT(share, 0.6);
 }
 
+TEST(TissuePatternTest, TheSlopeOfFatIsThatOfItsHeight) {
+  constexpr int kSize = 128;
+  const auto fat = MakeFatPattern(kSize);
+  EXPECT_EQ(fat, MakeFatPattern(kSize));
+  const auto at = [&](int x, int y, int channel) {
+    const int texel = (y + kSize) % kSize * kSize + (x + kSize) % kSize;
+    return static_cast<double>(fat[static_cast<std::size_t>(4 * texel + channel)]);
+  };
+  double along = 0, squared = 0, most = 0;  // Least squares: slope = share * difference of heights.
+  int vessels = 0;
+  for (int y = 0; y < kSize; ++y) {
+    for (int x = 0; x < kSize; ++x) {
+      most = std::max(most, at(x, y, 2));
+      vessels += at(x, y, 3) < 64 ? 1 : 0;
+      for (const int channel : {0, 1}) {
+        const double rise = at(x + 1 - channel, y + channel, 2) - at(x - 1 + channel, y - channel, 2);
+        along += rise * (at(x, y, channel) - 128);
+        squared += rise * rise;
+      }
+    }
+  }
+  constexpr double kHeight_m = 1.05e-3, kTwoTexels_m = 2.0 * static_cast<double>(kFatPeriod_m) / kSize;
+  EXPECT_NEAR(along / squared, 64 * kHeight_m / 255 / kTwoTexels_m, 0.05 * along / squared);
+  EXPECT_GT(most, 200);
+  EXPECT_GT(vessels, 20);
+  EXPECT_LT(vessels, kSize * kSize / 5);
+}
+
 TEST(LaparoscopeTest, ThePictureKeepsItsShapeInAnyWindow) {
   RenderParams params;
   params.width = 960;
