@@ -21,10 +21,10 @@ constexpr float kThinsToRim = 2.5f;     // Thickness by which fat recedes from a
 constexpr float kFollow = 0.45f;
 constexpr float kMostFollow = 0.002f;  // [m]
 constexpr float kFlattest = 0.15f;     // Share of its height to which a membrane that is pressed down flattens the fat.
-// Cells beside a cut within which fat may be bared: 12 mm in the built-in scene. Those of the membrane are searched
-// farther away.
-constexpr int kReach = 10, kSearched = 16;
-constexpr int kFine = 2;  // Points a cell at which coverage is found.
+constexpr int kBeyond = 2;             // Cells around the openings within which fat may be bared,
+constexpr int kSearched = 12;          // and around the cuts within which pieces of the membrane may lie over them.
+constexpr float kFlattestSight = 0.5f;  // Sine of the least angle between line of sight and fat that is used.
+constexpr int kFine = 2;                // Points a cell at which coverage is found.
 
 /// Two sides of a triangle and their cross product, which turn with it.
 Mat3f FrameOf(const Triangle& t, std::span<const float> xyz) {
@@ -36,12 +36,15 @@ Mat3f FrameOf(const Triangle& t, std::span<const float> xyz) {
   return frame;
 }
 
+/// Unit vector along `normal` or against it, on the side of `up`.
+Vec3f Outward(const Vec3f& normal, const Vec3f& up) { return (normal.dot(up) < 0 ? -normal : normal).normalized(); }
+
 /// Marks the points of a raster within a triangle, its border included.
 void MarkTriangle(const Vec2f& a, const Vec2f& b, const Vec2f& c, int width, int height,
                   std::vector<std::uint8_t>* raster) {
   const Vec2f low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
-  const int x0 = std::max(0, static_cast<int>(std::ceil(low.x() - 0.01f))),
-            x1 = std::min(width - 1, static_cast<int>(high.x() + 0.01f));
+  const int x0 = std::max(0, static_cast<int>(std::ceil(low.x() - 0.01f)));
+  const int x1 = std::min(width - 1, static_cast<int>(high.x() + 0.01f));
   const int y0 = std::max(0, static_cast<int>(std::ceil(low.y() - 0.01f)));
   const int y1 = std::min(height - 1, static_cast<int>(high.y() + 0.01f));
   const auto cross = [](const Vec2f& u, const Vec2f& v) { return u.x() * v.y() - u.y() * v.x(); };
@@ -157,14 +160,16 @@ void FatLayer::FindCuts(const MembraneMesh& membrane) {
   }
 }
 
-void FatLayer::Update(std::span<const float> xyz, const MembraneMesh& membrane) {
+void FatLayer::Update(std::span<const float> xyz, const MembraneMesh& membrane, const Vec3f& eye_W) {
   for (std::size_t k = 0; k < anchors_.size(); ++k) {
     feet_[k] = anchors_[k].foot.At(xyz);
     ups_[k] = (FrameOf(anchors_[k].foot.triangle, xyz) * anchors_[k].up).normalized();
   }
   std::fill(bared_.begin(), bared_.end(), 0.0f);
   for (const Grid& grid : grids_) {
-    if (grid.any_cut) FindBared(grid, membrane);
+    if (!grid.any_cut) continue;
+    FindBared(grid, membrane, nullptr);
+    FindBared(grid, membrane, &eye_W);
   }
   for (std::size_t k = 0; k < anchors_.size(); ++k) {
     const Anchor& anchor = anchors_[k];
@@ -188,13 +193,15 @@ void FatLayer::Update(std::span<const float> xyz, const MembraneMesh& membrane) 
   ComputeNormals(positions_, triangles_, normals_);
 }
 
-/// Finds over which cells of the grid each piece of the membrane lies now: a node's displacement from its place at
-/// rest, carried by the tube, is expressed in cells; pieces that are not cut cover the points between their nodes.
-void FatLayer::FindBared(const Grid& grid, const MembraneMesh& membrane) {
+/// Finds which points of the grid the membrane covers or, with an eye, hides from it: a node's displacement from its
+/// place at rest, carried by the tube, is followed along the normal or the line of sight onto the fat and expressed in
+/// cells; pieces that are not cut cover the points between their nodes.
+void FatLayer::FindBared(const Grid& grid, const MembraneMesh& membrane, const Vec3f* eye_W) {
   int left = grid.cols, right = 0, low = grid.rows, high = 0;  // Vertices around all cuts.
+  const auto cut = [&grid](int c, int r) { return grid.cut[TexelIndex(c, r, grid.cols - 1)] != 0; };
   for (int r = 0; r + 1 < grid.rows; ++r) {
     for (int c = 0; c + 1 < grid.cols; ++c) {
-      if (grid.cut[TexelIndex(c, r, grid.cols - 1)] == 0) continue;
+      if (!cut(c, r)) continue;
       left = std::min(left, c);
       right = std::max(right, c + 1);
       low = std::min(low, r);
@@ -202,43 +209,36 @@ void FatLayer::FindBared(const Grid& grid, const MembraneMesh& membrane) {
     }
   }
   const auto within = [](int value, int count) { return std::clamp(value, 0, count - 1); };
-  const int c0 = within(left - kReach, grid.cols), c1 = within(right + kReach, grid.cols);
-  const int r0 = within(low - kReach, grid.rows), r1 = within(high + kReach, grid.rows);
   const int from_c = within(left - kSearched, grid.cols), to_c = within(right + kSearched, grid.cols);
   const int from_r = within(low - kSearched, grid.rows), to_r = within(high + kSearched, grid.rows);
-  const auto vertex = [&grid](int c, int r) { return grid.first + TexelIndex(c, r, grid.cols); };
-  const auto rest_place = [&](int c, int r) -> Vec3f {
-    const std::size_t k = vertex(within(c, grid.cols), within(r, grid.rows));
-    return feet_[k] + anchors_[k].rest_gap * ups_[k];
-  };
-  const int width = kFine * (c1 - c0) + 1, rows = kFine * (r1 - r0) + 1;
   over_.resize(static_cast<std::size_t>(grid.cols) * static_cast<std::size_t>(grid.rows));
   for (int r = from_r; r <= to_r; ++r) {
-    for (int c = from_c; c <= to_c; ++c) {
-      const Vec3f along = (rest_place(c + 1, r) - rest_place(c - 1, r)) /
-                          static_cast<float>(within(c + 1, grid.cols) - within(c - 1, grid.cols));
-      const Vec3f across = (rest_place(c, r + 1) - rest_place(c, r - 1)) /
-                           static_cast<float>(within(r + 1, grid.rows) - within(r - 1, grid.rows));
-      const Vec3f moved = membrane.positions()[anchors_[vertex(c, r)].node] - rest_place(c, r);
-      const float aa = along.squaredNorm(), ab = along.dot(across), bb = across.squaredNorm();
-      const float determinant = aa * bb - ab * ab;
-      Vec2f cells = Vec2f::Zero();
-      if (determinant > 0) {
-        const float ma = moved.dot(along), mb = moved.dot(across);
-        cells = Vec2f(bb * ma - ab * mb, aa * mb - ab * ma) / determinant;
+    for (int c = from_c; c <= to_c; ++c) over_[TexelIndex(c, r, grid.cols)] = PlaceOver(grid, c, r, membrane, eye_W);
+  }
+  Vec2f least = Vec2f::Constant(1e9f), most = -least;  // Of the openings.
+  for (int r = low; r < high; ++r) {
+    for (int c = left; c < right; ++c) {
+      for (int k = 0; cut(c, r) && k < 4; ++k) {
+        const Vec2f& corner = over_[TexelIndex(c + k % 2, r + k / 2, grid.cols)];
+        least = least.cwiseMin(corner);
+        most = most.cwiseMax(corner);
       }
-      // What continues the sheet covers the points beyond its rim.
-      const auto beyond = [](int value, int count) { return value == 0 ? -2.0f : value == count - 1 ? 2.0f : 0.0f; };
-      cells += Vec2f(beyond(c, grid.cols), beyond(r, grid.rows));
-      over_[TexelIndex(c, r, grid.cols)] =
-          kFine * (Vec2f(static_cast<float>(c - c0), static_cast<float>(r - r0)) + cells);
     }
   }
+  const auto cell = [&within](float value, int count) {
+    return within(static_cast<int>(std::clamp(value, 0.0f, static_cast<float>(count))), count);
+  };
+  const int c0 = cell(least.x() - kBeyond, grid.cols), c1 = cell(most.x() + kBeyond, grid.cols);
+  const int r0 = cell(least.y() - kBeyond, grid.rows), r1 = cell(most.y() + kBeyond, grid.rows);
+  const int width = kFine * (c1 - c0) + 1, rows = kFine * (r1 - r0) + 1;
   covered_.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(rows), 0);
+  const Vec2f origin(static_cast<float>(c0), static_cast<float>(r0));
   for (int r = from_r; r < to_r; ++r) {
     for (int c = from_c; c < to_c; ++c) {
-      if (grid.cut[TexelIndex(c, r, grid.cols - 1)] != 0) continue;
-      const auto over = [&](int dc, int dr) { return over_[TexelIndex(c + dc, r + dr, grid.cols)]; };
+      if (cut(c, r)) continue;
+      const auto over = [&](int dc, int dr) -> Vec2f {
+        return kFine * (over_[TexelIndex(c + dc, r + dr, grid.cols)] - origin);
+      };
       MarkTriangle(over(0, 0), over(1, 0), over(1, 1), width, rows, &covered_);
       MarkTriangle(over(0, 0), over(1, 1), over(0, 1), width, rows, &covered_);
     }
@@ -254,9 +254,42 @@ void FatLayer::FindBared(const Grid& grid, const MembraneMesh& membrane) {
         }
       }
       // Full where half of the points up to half a cell away are open.
-      bared_[vertex(c, r)] = std::min(1.0f, 2.0f * static_cast<float>(open) / static_cast<float>(all));
+      float& bared = bared_[grid.first + TexelIndex(c, r, grid.cols)];
+      bared = std::max(bared, std::min(1.0f, 2.0f * static_cast<float>(open) / static_cast<float>(all)));
     }
   }
+}
+
+Vec2f FatLayer::PlaceOver(const Grid& grid, int c, int r, const MembraneMesh& membrane, const Vec3f* eye_W) const {
+  const int west = std::max(c - 1, 0), east = std::min(c + 1, grid.cols - 1);
+  const int south = std::max(r - 1, 0), north = std::min(r + 1, grid.rows - 1);
+  const auto rest_place = [&](int column, int row) -> Vec3f {
+    const std::size_t k = grid.first + TexelIndex(column, row, grid.cols);
+    return feet_[k] + anchors_[k].rest_gap * ups_[k];
+  };
+  const Vec3f along = (rest_place(east, r) - rest_place(west, r)) / static_cast<float>(east - west);
+  const Vec3f across = (rest_place(c, north) - rest_place(c, south)) / static_cast<float>(north - south);
+  const std::size_t k = grid.first + TexelIndex(c, r, grid.cols);
+  const Vec3f& node = membrane.positions()[anchors_[k].node];
+  Vec3f moved = node - rest_place(c, r);
+  if (eye_W != nullptr) {
+    const Vec3f normal = Outward(along.cross(across), ups_[k]);
+    const float height = moved.dot(normal) + (1 - anchors_[k].weight) * anchors_[k].rest_gap;  // Above the fat.
+    const Vec3f sight = (node - *eye_W).normalized();
+    const float facing = -sight.dot(normal);
+    // Only the part along the fat counts below.
+    moved += std::max(0.0f, height) / std::max(facing, kFlattestSight) * sight;
+  }
+  const float aa = along.squaredNorm(), ab = along.dot(across), bb = across.squaredNorm();
+  const float determinant = aa * bb - ab * ab;
+  Vec2f place(static_cast<float>(c), static_cast<float>(r));
+  if (determinant > 0) {
+    const float ma = moved.dot(along), mb = moved.dot(across);
+    place += Vec2f(bb * ma - ab * mb, aa * mb - ab * ma) / determinant;
+  }
+  // What continues the sheet hides the points beyond its rim.
+  const auto beyond = [](int value, int count) { return value == 0 ? -2.0f : value == count - 1 ? 2.0f : 0.0f; };
+  return place + Vec2f(beyond(c, grid.cols), beyond(r, grid.rows));
 }
 
 }  // namespace fulcrum::render

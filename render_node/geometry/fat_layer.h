@@ -20,8 +20,8 @@ class FatLayer {
   void FindCuts(const MembraneMesh& membrane);
 
   /// Computes positions, normals and bared shares from the particles and the membrane as drawn, in which removed nodes
-  /// have well-defined places.
-  void Update(std::span<const float> xyz, const MembraneMesh& membrane);
+  /// have well-defined places. Bared is also what can be seen from `eye_W` [m] past the membrane.
+  void Update(std::span<const float> xyz, const MembraneMesh& membrane, const Vec3f& eye_W);
 
   [[nodiscard]] std::span<const Vec3f> positions() const { return positions_; }
   [[nodiscard]] std::span<const Vec3f> normals() const { return normals_; }
@@ -30,8 +30,8 @@ class FatLayer {
   /// that is fused with the organ, where there is none.
   [[nodiscard]] std::span<const float> thickness() const { return thickness_; }
   [[nodiscard]] std::span<const Triangle> triangles() const { return triangles_; }
-  /// Bared share of each vertex: 1 where no part of the membrane lies over it, falling to 0 beneath the membrane over
-  /// about two vertices, so that the border runs within triangles and not along their edges.
+  /// Bared share of each vertex: 1 where no part of the membrane covers or hides it, falling to 0 beneath it over about
+  /// a vertex, so that the border runs within triangles and not along their edges.
   [[nodiscard]] std::span<const float> bared() const { return bared_; }
 
  private:
@@ -51,14 +51,16 @@ class FatLayer {
     bool any_cut = false;
   };
   void AddSheet(const SceneView& scene, const SheetPart& sheet, std::uint32_t stride, const NearestOnSurface& nearest);
-  void FindBared(const Grid& grid, const MembraneMesh& membrane);
+  void FindBared(const Grid& grid, const MembraneMesh& membrane, const Vec3f* eye_W);
+  /// Place in the grid, in cells, over which the membrane's node of vertex (c, r) lies or, with an eye, is seen.
+  [[nodiscard]] Vec2f PlaceOver(const Grid& grid, int c, int r, const MembraneMesh& membrane, const Vec3f* eye_W) const;
 
   std::vector<Anchor> anchors_;
   std::vector<Grid> grids_;
   std::uint32_t node_cols_ = 0;
   std::vector<Vec3f> ups_;   // [m] Unit, as now.
   std::vector<Vec3f> feet_;  // [m]
-  std::vector<Vec2f> over_;  // Scratch: cell of the grid over which each vertex' node of the membrane lies.
+  std::vector<Vec2f> over_;  // Scratch: PlaceOver of each vertex.
   std::vector<std::uint8_t> covered_;
   std::vector<Vec3f> positions_;
   std::vector<Vec3f> normals_;

@@ -274,7 +274,7 @@ void TissueLayers::UpdateMembrane() {
 
 void TissueLayers::UpdateFat() {
   if (topology_changed_) fat_.FindCuts(membrane_);
-  fat_.Update(xyz_, membrane_);
+  fat_.Update(xyz_, membrane_, eye_W_);
   for (const Layer* layer : {&beneath_layer_, &fat_layer_}) {
     layer->mesh->SetPositions(fat_.positions());
     layer->mesh->SetNormals(fat_.normals());

@@ -1,8 +1,8 @@
 // Loose fat between membrane and organ, a thin veil over the organ's front and thick beside it, with ureter and nerve
-// shining through. Where it is bared: yellow lobules with vessels in their clefts and a film of areolar tissue over them.
-// Beneath the intact membrane, which blurs what lies below, only a pale tint is left of them; BENEATH draws nothing else.
-// coordinate: material (s, t) [m], thickness 0 … 1 or, towards a rim that is fused with the organ, negative, bared share
-// 0 … 1.
+// shining through. Where it is bared: yellow lobules with vessels in their clefts and a film of areolar tissue over
+// them. Beneath the intact membrane, which blurs what lies below, only a pale tint is left of them; BENEATH draws
+// nothing else. coordinate: material (s, t) [m], thickness 0 … 1 or, towards a rim that is fused with the organ,
+// negative, bared share 0 … 1.
 in vec3 position;
 in vec3 normal;
 in vec4 coordinate;
@@ -33,7 +33,7 @@ void main() {
   vec4 fat = texture(fat_pattern, m * 36.0 + 0.35 * broad.rg);
   vec4 heat = texture(atlas, m * atlas_per_metre);
   float blood = texture(film_map, m * film_per_metre).r;
-  float opened = max(heat.a < 0.5 ? 1.0 : 0.0, smoothstep(0.35, 0.65, coordinate.w));
+  float opened = max(heat.a < 0.5 ? 1.0 : 0.0, smoothstep(0.2, 0.8, coordinate.w));
 
   // Directions of s and t on the surface, for the slope of the lobules. Where it is seen edge on they cannot be found.
   vec3 px = dFdx(position), py = dFdy(position);

@@ -103,9 +103,10 @@ void main() {
   float hot = colour_by_temperature * clamp((celsius - 45.0) / 55.0, 0.0, 1.0);
   albedo = mix(albedo, vec3(0.22, 0.075, 0.022), hot);
   alpha = mix(alpha, 0.95, hot);
-  // The rim of a slit draws back: thick, blanched, towards the cut tan.
+  // The rim of a slit draws back: thick, blanched, at the cut tan and, where it is dry, brown.
   float lip = smoothstep(0.42, 0.85, edge);
-  albedo = mix(albedo, mix(vec3(0.84, 0.64, 0.50), vec3(0.44, 0.22, 0.09), smoothstep(0.80, 0.97, edge + 0.35 * bend.z)), 0.8 * lip);
+  vec3 seam = mix(vec3(0.44, 0.22, 0.09), vec3(0.16, 0.060, 0.022), brown);
+  albedo = mix(albedo, mix(vec3(0.84, 0.64, 0.50), seam, smoothstep(0.80, 0.97, edge + 0.35 * bend.z)), 0.8 * lip);
   alpha = mix(alpha, 0.90, lip);
   // Blood lies on top and seeps away where the sheet ends.
   float blood = wet_film.r * (1.0 - smoothstep(0.5, 0.95, abs(coordinate.w)));
