@@ -42,13 +42,15 @@ Vec3f Outward(const Vec3f& normal, const Vec3f& up) { return (normal.dot(up) < 0
 /// Marks the points of a raster within a triangle, its border included.
 void MarkTriangle(const Vec2f& a, const Vec2f& b, const Vec2f& c, int width, int height,
                   std::vector<std::uint8_t>* raster) {
-  const Vec2f low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
-  const int x0 = std::max(0, static_cast<int>(std::ceil(low.x() - 0.01f)));
-  const int x1 = std::min(width - 1, static_cast<int>(high.x() + 0.01f));
-  const int y0 = std::max(0, static_cast<int>(std::ceil(low.y() - 0.01f)));
-  const int y1 = std::min(height - 1, static_cast<int>(high.y() + 0.01f));
   const auto cross = [](const Vec2f& u, const Vec2f& v) { return u.x() * v.y() - u.y() * v.x(); };
   const float area = cross(b - a, c - a);
+  if (!(std::abs(area) > 0.0f)) return;
+  const Vec2f size(static_cast<float>(width), static_cast<float>(height));
+  const Vec2f low = a.cwiseMin(b).cwiseMin(c).cwiseMax(0.0f).cwiseMin(size);
+  const Vec2f high = a.cwiseMax(b).cwiseMax(c).cwiseMax(-1.0f).cwiseMin(size);
+  const int x0 = static_cast<int>(std::ceil(low.x() - 0.01f)), y0 = static_cast<int>(std::ceil(low.y() - 0.01f));
+  const int x1 = std::min(width - 1, static_cast<int>(std::floor(high.x() + 0.01f)));
+  const int y1 = std::min(height - 1, static_cast<int>(std::floor(high.y() + 0.01f)));
   const float rounding = -1e-3f * area * area;  // Nodes at rest lie on points of the raster.
   for (int y = y0; y <= y1; ++y) {
     for (int x = x0; x <= x1; ++x) {
@@ -165,11 +167,13 @@ void FatLayer::Update(std::span<const float> xyz, const MembraneMesh& membrane, 
     feet_[k] = anchors_[k].foot.At(xyz);
     ups_[k] = (FrameOf(anchors_[k].foot.triangle, xyz) * anchors_[k].up).normalized();
   }
-  std::fill(bared_.begin(), bared_.end(), 0.0f);
+  uncovered_.assign(anchors_.size(), 0.0f);
   for (const Grid& grid : grids_) {
-    if (!grid.any_cut) continue;
-    FindBared(grid, membrane, nullptr);
-    FindBared(grid, membrane, &eye_W);
+    if (grid.any_cut) FindBared(grid, membrane, nullptr, &uncovered_);
+  }
+  bared_ = uncovered_;
+  for (const Grid& grid : grids_) {
+    if (grid.any_cut) FindBared(grid, membrane, &eye_W, &bared_);
   }
   for (std::size_t k = 0; k < anchors_.size(); ++k) {
     const Anchor& anchor = anchors_[k];
@@ -177,7 +181,7 @@ void FatLayer::Update(std::span<const float> xyz, const MembraneMesh& membrane, 
     const float height = anchor.weight * anchor.rest_gap;
     const Vec3f alone = foot + height * ups_[k];
     positions_[k] = alone;
-    if (bared_[k] == 1) continue;
+    if (uncovered_[k] == 1) continue;
     const Vec3f up = membrane.positions()[anchor.node] - foot;
     const float gap = up.norm();
     const float lift = std::max(0.0f, gap - anchor.rest_gap);
@@ -188,7 +192,7 @@ void FatLayer::Update(std::span<const float> xyz, const MembraneMesh& membrane, 
     const Vec3f beneath = foot + pressed * height * ups_[k];
     const Vec3f offset = foot + weight * up - beneath;
     const Vec3f covered = beneath + std::min(1.0f, kMostFollow / std::max(offset.norm(), kMostFollow)) * offset;
-    positions_[k] = covered + bared_[k] * (alone - covered);
+    positions_[k] = covered + uncovered_[k] * (alone - covered);
   }
   ComputeNormals(positions_, triangles_, normals_);
 }
@@ -196,7 +200,8 @@ void FatLayer::Update(std::span<const float> xyz, const MembraneMesh& membrane, 
 /// Finds which points of the grid the membrane covers or, with an eye, hides from it: a node's displacement from its
 /// place at rest, carried by the tube, is followed along the normal or the line of sight onto the fat and expressed in
 /// cells; pieces that are not cut cover the points between their nodes.
-void FatLayer::FindBared(const Grid& grid, const MembraneMesh& membrane, const Vec3f* eye_W) {
+void FatLayer::FindBared(const Grid& grid, const MembraneMesh& membrane, const Vec3f* eye_W,
+                         std::vector<float>* bared) {
   int left = grid.cols, right = 0, low = grid.rows, high = 0;  // Vertices around all cuts.
   const auto cut = [&grid](int c, int r) { return grid.cut[TexelIndex(c, r, grid.cols - 1)] != 0; };
   for (int r = 0; r + 1 < grid.rows; ++r) {
@@ -225,11 +230,12 @@ void FatLayer::FindBared(const Grid& grid, const MembraneMesh& membrane, const V
       }
     }
   }
-  const auto cell = [&within](float value, int count) {
-    return within(static_cast<int>(std::clamp(value, 0.0f, static_cast<float>(count))), count);
+  // Beyond the pieces that are looked at nothing is known to be open.
+  const auto cell = [](float value, int low_cell, int high_cell) {
+    return static_cast<int>(std::clamp(value, static_cast<float>(low_cell), static_cast<float>(high_cell)));
   };
-  const int c0 = cell(least.x() - kBeyond, grid.cols), c1 = cell(most.x() + kBeyond, grid.cols);
-  const int r0 = cell(least.y() - kBeyond, grid.rows), r1 = cell(most.y() + kBeyond, grid.rows);
+  const int c0 = cell(least.x() - kBeyond, from_c, to_c), c1 = cell(most.x() + kBeyond, from_c, to_c);
+  const int r0 = cell(least.y() - kBeyond, from_r, to_r), r1 = cell(most.y() + kBeyond, from_r, to_r);
   const int width = kFine * (c1 - c0) + 1, rows = kFine * (r1 - r0) + 1;
   covered_.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(rows), 0);
   const Vec2f origin(static_cast<float>(c0), static_cast<float>(r0));
@@ -254,8 +260,8 @@ void FatLayer::FindBared(const Grid& grid, const MembraneMesh& membrane, const V
         }
       }
       // Full where half of the points up to half a cell away are open.
-      float& bared = bared_[grid.first + TexelIndex(c, r, grid.cols)];
-      bared = std::max(bared, std::min(1.0f, 2.0f * static_cast<float>(open) / static_cast<float>(all)));
+      float& share = (*bared)[grid.first + TexelIndex(c, r, grid.cols)];
+      share = std::max(share, std::min(1.0f, 2.0f * static_cast<float>(open) / static_cast<float>(all)));
     }
   }
 }

@@ -51,7 +51,7 @@ class FatLayer {
     bool any_cut = false;
   };
   void AddSheet(const SceneView& scene, const SheetPart& sheet, std::uint32_t stride, const NearestOnSurface& nearest);
-  void FindBared(const Grid& grid, const MembraneMesh& membrane, const Vec3f* eye_W);
+  void FindBared(const Grid& grid, const MembraneMesh& membrane, const Vec3f* eye_W, std::vector<float>* bared);
   /// Place in the grid, in cells, over which the membrane's node of vertex (c, r) lies or, with an eye, is seen.
   [[nodiscard]] Vec2f PlaceOver(const Grid& grid, int c, int r, const MembraneMesh& membrane, const Vec3f* eye_W) const;
 
@@ -66,6 +66,7 @@ class FatLayer {
   std::vector<Vec3f> normals_;
   std::vector<Vec2f> materials_;
   std::vector<float> thickness_;
+  std::vector<float> uncovered_;  // Bared share without what an eye sees past the membrane: places do not depend on it.
   std::vector<float> bared_;
   std::vector<Triangle> triangles_;
 };

@@ -10,8 +10,22 @@ void PictureOutlet::Give(const Bitmap& picture, const Use& use) {
   if (use.file && !writer_.Add(picture, use.session_time_s)) files_dropped_.fetch_add(1, std::memory_order_relaxed);
 }
 
+void PictureOutlet::Lose() {
+  lost_.fetch_add(1, std::memory_order_relaxed);
+  if (expected_->file) files_dropped_.fetch_add(1, std::memory_order_relaxed);
+  expected_.reset();
+}
+
+void PictureOutlet::Expect(const Use& use) {
+  if (expected_) Lose();
+  expected_ = use;
+}
+
 void PictureOutlet::Collect(bool wait, Display* display) {
-  if (!expected_ || !display->TakeRead(wait, &read_)) return;
+  if (!expected_) return;
+  const ReadResult result = display->TakeRead(wait, &read_);
+  if (result == ReadResult::kPending) return;
+  if (result != ReadResult::kDone) return Lose();
   Give(read_, *expected_);
   expected_.reset();
 }
@@ -21,6 +35,7 @@ std::string PictureOutlet::FillHealth(Health* health) const {
   health->metrics.push_back({"png_failed", static_cast<double>(writer_.failed())});
   health->metrics.push_back({"png_dropped", static_cast<double>(files_dropped_.load(std::memory_order_relaxed))});
   std::string error = writer_.last_error();
+  if (error.empty() && lost() > 0) error = std::to_string(lost()) + " pictures could not be read from the GPU";
   if (!stream_) return error;
   health->metrics.push_back({"pictures_sent", static_cast<double>(stream_->sent())});
   health->metrics.push_back({"pictures_late", static_cast<double>(stream_->dropped())});

@@ -31,9 +31,10 @@ class PictureOutlet {
   [[nodiscard]] bool has_readers() const { return stream_ && stream_->has_readers(); }
 
   void Give(const Bitmap& picture, const Use& use);
-  /// The use of the picture whose reading `display` has started; Collect gives it.
-  void Expect(const Use& use) { expected_ = use; }
-  /// Gives the expected picture, if it has been read; with `wait` it waits for that.
+  /// The use of the picture whose reading a display has started; Collect gives it. A former one that has not come is
+  /// lost.
+  void Expect(const Use& use);
+  /// Gives the expected picture, if it has been read; with `wait` it waits for that. One that cannot be read is lost.
   void Collect(bool wait, Display* display);
 
   /// Waits until the files of the pictures given so far are written.
@@ -41,15 +42,19 @@ class PictureOutlet {
 
   // From any thread.
   [[nodiscard]] std::uint64_t files_written() const { return writer_.written(); }
+  /// Pictures that were drawn to be read and could not be.
+  [[nodiscard]] std::uint64_t lost() const { return lost_.load(std::memory_order_relaxed); }
   /// Adds the metrics, and returns the last error or an empty text.
   [[nodiscard]] std::string FillHealth(Health* health) const;
 
  private:
+  void Lose();
+
   FrameWriter writer_;
   std::unique_ptr<PictureStream> stream_;
   std::optional<Use> expected_;
   Bitmap read_;
-  std::atomic<std::uint64_t> files_dropped_{0};
+  std::atomic<std::uint64_t> files_dropped_{0}, lost_{0};
 };
 
 }  // namespace fulcrum::render

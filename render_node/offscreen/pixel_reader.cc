@@ -9,7 +9,7 @@ namespace fulcrum::render {
 namespace {
 
 constexpr std::size_t kTexelBytes = 4;  // A GPU copies its own format; three bytes a pixel would be converted first.
-constexpr GLuint64 kPatience_ns = 1'000'000'000;
+constexpr GLuint64 kPatience_ns = 1'000'000'000;  // A GPU that takes longer for a picture hangs.
 
 }  // namespace
 
@@ -42,11 +42,18 @@ void PixelReader::Start(int x, int y, int width, int height) {
   glFlush();  // Otherwise a poll without waiting could fail for ever.
 }
 
-bool PixelReader::Take(bool wait, Bitmap* picture) {
-  if (fence_ == nullptr) return false;
-  if (!wait && glClientWaitSync(static_cast<GLsync>(fence_), 0, 0) == GL_TIMEOUT_EXPIRED) return false;
-  if (wait) (void)glClientWaitSync(static_cast<GLsync>(fence_), GL_SYNC_FLUSH_COMMANDS_BIT, kPatience_ns);
+void PixelReader::Abandon() {
+  fence_ = nullptr;
+  buffer_ = 0;
+  bytes_ = 0;
+}
+
+ReadResult PixelReader::Take(bool wait, Bitmap* picture) {
+  if (fence_ == nullptr) return ReadResult::kNone;
+  const GLenum reached = glClientWaitSync(static_cast<GLsync>(fence_), 0, wait ? kPatience_ns : 0);
+  if (!wait && reached == GL_TIMEOUT_EXPIRED) return ReadResult::kPending;
   Forget();
+  if (reached == GL_TIMEOUT_EXPIRED || reached == GL_WAIT_FAILED) return ReadResult::kFailed;
   picture->width = width_;
   picture->height = height_;
   const std::size_t pixels = bytes_ / kTexelBytes;
@@ -63,7 +70,7 @@ bool PixelReader::Take(bool wait, Bitmap* picture) {
     glUnmapBuffer(GL_PIXEL_PACK_BUFFER);
   }
   glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
-  return from != nullptr;
+  return from != nullptr ? ReadResult::kDone : ReadResult::kFailed;
 }
 
 }  // namespace fulcrum::render

@@ -7,6 +7,14 @@
 namespace fulcrum::render {
 
 /// One copy at a time. All calls and the destructor need the OpenGL context current in which Start was called.
+/// Result of a request for a picture that is being read.
+enum class ReadResult {
+  kNone,     ///< No reading was started, or its picture was taken already.
+  kPending,  ///< It has not been read completely.
+  kFailed,   ///< It cannot be read; the reading is over.
+  kDone,
+};
+
 class PixelReader {
  public:
   PixelReader() = default;
@@ -19,8 +27,10 @@ class PixelReader {
   void Start(int x, int y, int width, int height);
   /// A copy was started and not taken yet.
   [[nodiscard]] bool pending() const { return fence_ != nullptr; }
-  /// Gives the copy if it is complete; with `wait` it waits for that. Returns false if there is none.
-  bool Take(bool wait, Bitmap* picture);
+  /// Gives the copy if it is complete; with `wait` it waits for that.
+  [[nodiscard]] ReadResult Take(bool wait, Bitmap* picture);
+  /// Gives up copy and buffer without OpenGL, whose context is gone with them.
+  void Abandon();
 
  private:
   void Forget();

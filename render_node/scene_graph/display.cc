@@ -84,12 +84,12 @@ class OffscreenDisplay : public Display {
     context_.Release();
   }
 
-  bool TakeRead(bool wait, Bitmap* picture) override {
-    if (!reader_->pending()) return false;
+  [[nodiscard]] ReadResult TakeRead(bool wait, Bitmap* picture) override {
+    if (!reader_->pending()) return ReadResult::kNone;
     context_.MakeCurrent();
-    const bool taken = reader_->Take(wait, picture);
+    const ReadResult result = reader_->Take(wait, picture);
     context_.Release();
-    return taken;
+    return result;
   }
 
   [[nodiscard]] std::vector<int> TakeKeys() override { return {}; }
@@ -207,9 +207,10 @@ class WindowDisplay : public Display {
   }
 
   ~WindowDisplay() override {
-    context_->makeCurrent();
+    const bool current = context_->makeCurrent();
+    if (!current) reader_->Abandon();
     reader_.reset();
-    context_->releaseContext();
+    if (current) context_->releaseContext();
   }
 
   void Draw() override { viewer_.frame(); }
@@ -226,12 +227,15 @@ class WindowDisplay : public Display {
     read_->reader = nullptr;
   }
 
-  bool TakeRead(bool wait, Bitmap* picture) override {
-    if (!reader_->pending()) return false;
-    context_->makeCurrent();
-    const bool taken = reader_->Take(wait, picture);
+  [[nodiscard]] ReadResult TakeRead(bool wait, Bitmap* picture) override {
+    if (!reader_->pending()) return ReadResult::kNone;
+    if (!context_->makeCurrent()) {  // The window was closed.
+      reader_->Abandon();
+      return ReadResult::kFailed;
+    }
+    const ReadResult result = reader_->Take(wait, picture);
     context_->releaseContext();
-    return taken;
+    return result;
   }
 
   [[nodiscard]] std::vector<int> TakeKeys() override {

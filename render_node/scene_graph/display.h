@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "render_node/offscreen/framebuffer.h"
+#include "render_node/offscreen/pixel_reader.h"
 #include "render_node/scene_graph/laparoscope_view.h"
 
 namespace fulcrum::render {
@@ -21,8 +21,7 @@ class Display {
   /// lost.
   virtual void DrawAndStartRead() = 0;
   /// Gives the picture of the last DrawAndStartRead if it has been read completely; with `wait` it waits for that.
-  /// Returns false if there is none.
-  virtual bool TakeRead(bool wait, Bitmap* picture) = 0;
+  [[nodiscard]] virtual ReadResult TakeRead(bool wait, Bitmap* picture) = 0;
   /// Keys pressed since the last call, as X key symbols. Also processes the window's events, so it must be called even
   /// if nothing is drawn.
   [[nodiscard]] virtual std::vector<int> TakeKeys() = 0;

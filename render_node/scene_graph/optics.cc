@@ -27,6 +27,11 @@ osg::Matrix ToOsg(const Eigen::Matrix4f& m) {
   return out;
 }
 
+void LookFrom(const Laparoscope& eye, osg::Camera* camera) {
+  camera->setViewMatrix(ToOsg(eye.view));
+  camera->setProjectionMatrix(ToOsg(eye.projection));
+}
+
 /// Disables its camera after a picture, until something has changed.
 class DrawnOnce : public osg::Camera::DrawCallback {
  public:
@@ -120,9 +125,7 @@ void Optics::SetSize(std::span<const Laparoscope> eyes, int width, int height) {
   half_height_ = eyes.front().picture_centre.y() * squeeze;
   for (std::size_t k = 0; k < eyes_.size(); ++k) {
     Background& background = eyes_[k].backgrounds[eyes_[k].used];
-    for (const Target& target : {background.target, eyes_[k].scene}) {
-      target.camera->setProjectionMatrix(ToOsg(eyes[k].projection));
-    }
+    for (const Target& target : {background.target, eyes_[k].scene}) LookFrom(eyes[k], target.camera);
     background.from = eyes[k];
   }
   ResizeTextures();
@@ -256,11 +259,7 @@ void Optics::SetEyes(std::span<const Laparoscope> eyes) {
     Eye& eye = eyes_[k];
     const Laparoscope& seen = eyes[k];
     eye.light_position->set(osg::Vec3(seen.light_position.x(), seen.light_position.y(), seen.light_position.z()));
-    const auto look = [&](osg::Camera* camera) {
-      camera->setViewMatrix(ToOsg(seen.view));
-      camera->setProjectionMatrix(ToOsg(seen.projection));
-    };
-    look(eye.scene.camera);
+    LookFrom(seen, eye.scene.camera);
     const auto is_of = [&](const Background& each) {
       return each.from && each.from->view == seen.view && each.from->projection == seen.projection &&
              each.from->light_power == seen.light_power;
@@ -269,7 +268,7 @@ void Optics::SetEyes(std::span<const Laparoscope> eyes) {
     eye.Use(1 - eye.used);
     Background& next = eye.backgrounds[eye.used];
     if (is_of(next)) continue;
-    look(next.target.camera);
+    LookFrom(seen, next.target.camera);
     next.target.camera->setNodeMask(~0u);
     next.from = seen;
   }

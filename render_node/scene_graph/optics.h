@@ -1,7 +1,8 @@
 // Drawing of the scene into the picture: the scene is drawn into a texture at the resolution of the quality setting,
 // and its round field is scaled into the picture. The static background is drawn once for a place of the camera,
-// into a texture of its own, and copied with its depth before each picture of the scene. With stereo each eye has its own textures, half as wide or
-// high as the picture, and its field fills its half of the picture; the meshes are the same.
+// into a texture of its own, and copied with its depth before each picture of the scene. With stereo each eye has its
+// own textures, half as wide or high as the picture, and its field fills its half of the picture; the meshes are the
+// same.
 #pragma once
 
 #include <array>
@@ -50,7 +51,7 @@ class Optics {
   struct Background {
     Target target;
     osg::ref_ptr<osg::Geode> copy;    // Into the scene.
-    std::optional<Laparoscope> from;  // None: nothing has been drawn, nor will be in the next picture.
+    std::optional<Laparoscope> from;  // Empty: holds no picture, and will hold none after the next.
   };
   /// What an eye sees, and its part of the picture.
   struct Eye {

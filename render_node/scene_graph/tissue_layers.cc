@@ -235,13 +235,13 @@ bool TissueLayers::Update() {
   UpdateMembrane();
   UpdateFat();
   if (tissue_changed_ || scope_changed_) {
-    UpdateSolids();
+    if (tissue_changed_) UpdateSolids();
     for (SolidLayer& solid : solids_) {
       const auto own = [&](const std::vector<Vec3f>& all) {
         return std::span(all).subspan(solid.first_vertex, solid.vertex_count);
       };
-      solid.layer.mesh->SetPositions(own(solid_positions_));
-      solid.layer.mesh->SetNormals(own(solid_normals_));
+      if (tissue_changed_) solid.layer.mesh->SetPositions(own(solid_positions_));
+      if (tissue_changed_) solid.layer.mesh->SetNormals(own(solid_normals_));
       Show(&solid.layer, own(solid_positions_), solid.triangles, Sides::kFront);
     }
   }
@@ -256,10 +256,11 @@ void TissueLayers::UpdateSolids() {
 }
 
 void TissueLayers::UpdateMembrane() {
-  membrane_.Update(xyz_);
+  const bool moved = tissue_changed_ || topology_changed_;
+  if (moved) membrane_.Update(xyz_);
   const std::span<const Vec3f> positions = membrane_.positions();
-  sheet_.mesh->SetPositions(positions);
-  sheet_.mesh->SetNormals(membrane_.normals());
+  if (moved) sheet_.mesh->SetPositions(positions);
+  if (moved) sheet_.mesh->SetNormals(membrane_.normals());
   if (topology_changed_) {
     std::vector<Float4> coordinates(positions.size());
     for (std::size_t k = 0; k < coordinates.size(); ++k) {
@@ -297,11 +298,11 @@ void TissueLayers::ChooseFat() {
   fat_shown_.clear();
   fat_beneath_.clear();
   for (const Triangle& t : fat_.triangles()) {
-    if (open(t[0]) || open(t[1]) || open(t[2])) {
-      fat_shown_.push_back(t);
-    } else if (fat_visible_[t[0]] != 0 || fat_visible_[t[1]] != 0 || fat_visible_[t[2]] != 0) {
-      fat_beneath_.push_back(t);
-    }
+    const bool opened = open(t[0]) || open(t[1]) || open(t[2]);
+    const bool visible = fat_visible_[t[0]] != 0 || fat_visible_[t[1]] != 0 || fat_visible_[t[2]] != 0;
+    if (opened) fat_shown_.push_back(t);
+    // A rehearsal compiles both shaders.
+    if (rehearsing_ || (visible && !opened)) fat_beneath_.push_back(t);
   }
   fat_chosen_ = true;
   fat_bared_.assign(bared.begin(), bared.end());

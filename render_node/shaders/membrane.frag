@@ -62,7 +62,11 @@ void main() {
   if (coordinate.z < 0.0 || max(heat.a, heat_below.a) < 0.5) discard;
   vec4 noise = texture(serosa_pattern, m * 16.0);
   vec4 wet_film = texture(film_map, m * film_per_metre);
+#ifdef AS_PRINTED
+  float edge = 0.0; // No holes, no rims.
+#else
   float edge = wet_film.g;
+#endif
   float vessel = noise.a;
   float celsius = 20.0 + 127.5 * heat.r;
   float damage = heat.g;

@@ -169,7 +169,9 @@ struct Episode {
 Episode DrawEpisode(const fs::path& recording, const SceneView& scene, double until_s, const fs::path& file,
                     const std::function<void(double)>& progress) {
   const Kinematics kinematics = KinematicsOf(recording);
-  Projector projector(recording, scene);
+  SceneView drawn = scene;
+  drawn.stereo = {};  // One camera, and one picture.
+  Projector projector(recording, drawn);
   const double end_s = until_s >= 0 ? std::min(until_s, projector.end_s()) : projector.end_s();
   const auto count = static_cast<std::uint64_t>(std::floor(end_s * kVideoRate_Hz + 1e-6)) + 1;
   render::Bitmap picture;

@@ -93,13 +93,13 @@ TEST(WindowTest, ShowsWhatIsDrawnOffScreen) {
     EXPECT_FALSE(display->closed());
 
     Bitmap later;
-    EXPECT_FALSE(display->TakeRead(true, &later)) << "no reading was started";
+    EXPECT_EQ(display->TakeRead(true, &later), ReadResult::kNone);
     display->DrawAndStartRead();
     display->Draw();  // Changes nothing of what is read.
-    EXPECT_TRUE(display->TakeRead(true, &later));
+    EXPECT_EQ(display->TakeRead(true, &later), ReadResult::kDone);
     EXPECT_EQ(later.width, picture.width);
     EXPECT_EQ(later.rgb, picture.rgb);
-    EXPECT_FALSE(display->TakeRead(true, &later)) << "the picture was taken already";
+    EXPECT_EQ(display->TakeRead(true, &later), ReadResult::kNone) << "the picture was taken already";
     return picture;
   };
   const Bitmap in_window = draw(true), off_screen = draw(false);

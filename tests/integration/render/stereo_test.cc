@@ -199,8 +199,8 @@ TEST_P(StereoBalls, TheNearBallHidesTheFarOneAndEachEyeLooksPastItsOwnSide) {
 TEST_P(StereoBalls, WithoutAConvergenceTheTargetHasNoDisparity) {
   SceneView at_target = view_;
   at_target.stereo.convergence_m = 0;
+  display_ = nullptr;  // It refers to the view.
   laparoscope_ = nullptr;
-  display_ = nullptr;
   view_ = at_target;
   laparoscope_ = std::make_unique<LaparoscopeView>(view_);
   display_ = MakeOffscreenDisplay(*laparoscope_, view_.render);
