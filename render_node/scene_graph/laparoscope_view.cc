@@ -28,7 +28,11 @@ namespace {
 constexpr int kNoiseTexels = 256;
 constexpr int kSerosaTexels = 512;
 constexpr float kSerosaPerMetre = 16;  // As in membrane.frag.
-constexpr float kFatCover = 0.48f;     // fat.frag begins at 0.51.
+// Of the camera: with these the mean colour of pictures lies among those of published laparoscopic frames
+// (deploy/docs/measurements/picture/look.md). The albedos of the shaders were chosen by eye, and lacked blue.
+constexpr float kExposure = 0.86f;
+const Vec3f kTissueTint(0.96f, 0.92f, 1.14f);
+constexpr float kFatCover = 0.48f;  // fat.frag begins at 0.51.
 
 /// The numbers of the paper's eq. 15 for membrane.frag.
 void AddPrintedColour(float ambient_C, osg::StateSet* state) {
@@ -158,9 +162,10 @@ void LaparoscopeView::Impl::BindTextures() {
       new osg::Uniform("film_per_metre", osg::Vec2(1 / (film_texel * static_cast<float>(atlas.film_width())),
                                                    1 / (film_texel * static_cast<float>(atlas.film_height())))));
   state->addUniform(new osg::Uniform("light_axis", vec3(scope.light_axis)));
-  optics.SetLight(look.light);
-  state->addUniform(new osg::Uniform("light_colour", vec3(look.light)));
-  state->addUniform(new osg::Uniform("tissue_tint", vec3(look.tissue)));
+  const Vec3f light = kExposure * look.light;
+  optics.SetLight(light);
+  state->addUniform(new osg::Uniform("light_colour", vec3(light)));
+  state->addUniform(new osg::Uniform("tissue_tint", vec3(look.tissue.cwiseProduct(kTissueTint))));
   state->addUniform(wall_direction);
   state->addUniform(light_power);
   // Patches of the paper's model carry no damage.
