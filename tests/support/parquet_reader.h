@@ -74,9 +74,20 @@ struct ParquetTable {
   struct Column {
     int type = 0;                             ///< 0 boolean, 2 int64, 4 float.
     std::vector<std::vector<double>> values;  ///< By row.
+    std::vector<std::string> path;            ///< In the schema.
+    int codec = -1;                           ///< 0: not compressed.
+    std::vector<int> encodings;               ///< As the footer lists them: 0 PLAIN, 3 RLE.
+    std::vector<int> page_encodings;          ///< Of values, definition levels, repetition levels.
+  };
+  /// An element of the schema; -1 where the file has no such field.
+  struct Element {
+    std::string name;
+    int type = -1, repetition = -1, children = -1, converted = -1;
+    bool operator==(const Element&) const = default;
   };
   std::int64_t rows = 0;
   std::map<std::string, Column> columns;
+  std::vector<Element> schema;
 };
 
 /// Runs of levels of one bit, until there are `count`.
@@ -117,6 +128,13 @@ inline ParquetTable ReadParquet(const std::string& file) {
   if (reader.at() != file.size() - 8) throw std::runtime_error("the footer has another size");
   ParquetTable table;
   table.rows = footer.fields.at(3).integer;
+  for (const ThriftValue& element : footer.fields.at(2).list) {
+    const auto number = [&](int field) {
+      const auto found = element.fields.find(field);
+      return found == element.fields.end() ? -1 : static_cast<int>(found->second.integer);
+    };
+    table.schema.push_back({element.fields.at(4).text, number(1), number(3), number(5), number(6)});
+  }
   std::size_t end = 4;  // Of the page before.
   for (ThriftValue& chunk : footer.fields.at(4).list.at(0).fields.at(1).list) {
     auto& about = chunk.fields.at(3).fields;
@@ -138,6 +156,12 @@ inline ParquetTable ReadParquet(const std::string& file) {
     }
     ParquetTable::Column& column = table.columns[path.front().text];
     column.type = static_cast<int>(about.at(1).integer);
+    column.codec = static_cast<int>(about.at(4).integer);
+    for (const ThriftValue& part : path) column.path.push_back(part.text);
+    for (const ThriftValue& each : about.at(2).list) column.encodings.push_back(static_cast<int>(each.integer));
+    for (const int field : {2, 3, 4}) {
+      column.page_encodings.push_back(static_cast<int>(page.fields.at(5).fields.at(field).integer));
+    }
     for (std::size_t i = 0; i < count; ++i) {
       if (begins[i] == 0) column.values.emplace_back();
       column.values.back().push_back(PlainValue(file, at, column.type, i));

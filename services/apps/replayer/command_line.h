@@ -14,6 +14,8 @@ class CommandLine {
 
   /// True when the option was given; always true for an option with a default value.
   [[nodiscard]] bool Has(const char* option) const { return values_.count(option) != 0; }
+  /// True when the option was given, also for an option with a default value.
+  [[nodiscard]] bool IsGiven(const char* option) const { return Has(option) && !values_[option].defaulted(); }
   /// Value of an option that was given or has a default value.
   template <class T>
   [[nodiscard]] const T& ValueOf(const char* option) const {

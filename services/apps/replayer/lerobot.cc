@@ -5,7 +5,6 @@
 #include <fstream>
 #include <limits>
 #include <optional>
-#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -15,14 +14,12 @@
 #include "services/apps/replayer/new_folder.h"
 #include "services/apps/replayer/parquet_file.h"
 #include "services/apps/replayer/projector.h"
+#include "services/apps/replayer/recorded_kinematics.h"
 #include "services/apps/replayer/report_format.h"
 #include "services/apps/replayer/video.h"
 #include "services/apps/replayer/video_file.h"
 #include "services/base/core/error.h"
-#include "services/records/recording/mcap_reader.h"
 #include "services/scene/format/scene_file.h"
-#include "services/transport/bus/convert/cdr.h"
-#include "services/transport/bus/topics.h"
 
 namespace fulcrum::replay {
 namespace {
@@ -31,6 +28,10 @@ namespace fs = std::filesystem;
 
 constexpr const char* kCamera = "observation.images.endoscope";
 constexpr int kEpisodesInChunk = 1000;
+constexpr int kPicturesInGroup = 2;  // LeRobot's loader seeks single pictures.
+/// A row's time is a float. LeRobot refuses steps that differ from 1/30 s by more than 1e-4 s, and from 1,024 s on
+/// floats are 1.2e-4 s apart.
+constexpr double kLongestEpisode_s = 1000;
 constexpr std::size_t kPixelStep = 16;  // Of the statistics of the pictures, as in LeRobot every few pixels only.
 
 /// Least, greatest, mean and standard deviation of each dimension.
@@ -119,10 +120,18 @@ std::string StatisticsOf(const ParquetColumn& column) {
   return statistics.Text(false, count);
 }
 
-void WriteBytes(const fs::path& file, const std::vector<std::uint8_t>& bytes) {
-  std::ofstream out(file, std::ios::binary);
-  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  if (!out.flush()) throw InputError(file.string() + ": cannot be written; is the disk full?");
+/// The file is there as a whole or as it was before.
+void Replace(const fs::path& file, std::string_view bytes) {
+  const fs::path part = file.string() + ".part";
+  std::ofstream out(part, std::ios::binary);
+  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  out.close();
+  std::error_code error;
+  if (out) fs::rename(part, file, error);
+  if (out && !error) return;
+  std::error_code ignored;
+  fs::remove(part, ignored);
+  throw InputError(file.string() + ": cannot be written; is the disk full?");
 }
 
 std::string JsonList(const std::vector<std::string>& texts) {
@@ -131,23 +140,27 @@ std::string JsonList(const std::vector<std::string>& texts) {
   return "[" + list + "]";
 }
 
-template <class T>
-void AddIf(const std::string& topic, std::span<const std::uint8_t> bytes, Kinematics* to) {
-  T sample;
-  if (topic == bus::RoleOf<T>().name && bus::DecodeCdr(bytes, &sample)) to->Add(sample);
-}
+/// Of a recording, which ends at `end_s`, the session time of the last row [s].
+double LastRow(double end_s, double until_s) { return until_s >= 0 ? std::min(until_s, end_s) : end_s; }
 
-Kinematics KinematicsOf(const fs::path& recording) {
-  Kinematics kinematics;
-  recording::McapReader reader(recording);
-  for (recording::McapMessage message{}; reader.Next(&message);) {
-    const std::string& topic = reader.channels().at(message.channel).topic;
-    AddIf<ToolState>(topic, message.data, &kinematics);
-    AddIf<HandleState>(topic, message.data, &kinematics);
-    AddIf<ContactModel>(topic, message.data, &kinematics);
+/// Finds before the first picture what would end the work in hours. The samples are read again for the episode: those
+/// of all recordings may not fit into memory.
+void Check(const fs::path& recording, const SceneView& scene, double until_s) {
+  const std::string leave_out = "; or leave out " + recording.string();
+  try {
+    const double last_s = LastRow(ReadKinematics(recording, scene).end_s, until_s);
+    if (last_s > kLongestEpisode_s) {
+      throw InputError(
+          recording.string() +
+          Format(": an episode of %.1f s; valid: 0 to %.0f s, because the time of a row is a 32-bit number. "
+                 "Give --until %.0f",
+                 last_s, kLongestEpisode_s, kLongestEpisode_s));
+    }
+  } catch (const InputError& error) {
+    throw InputError(error.what() + leave_out);
+  } catch (const MismatchError& error) {
+    throw MismatchError(error.what() + leave_out);
   }
-  if (kinematics.empty()) throw InputError(recording.string() + ": has no poses of instruments (topic ToolState)");
-  return kinematics;
 }
 
 double TimeOf(std::uint64_t frame) { return static_cast<double>(frame) / kVideoRate_Hz; }
@@ -168,23 +181,23 @@ struct Episode {
 /// Draws the video of a session.
 Episode DrawEpisode(const fs::path& recording, const SceneView& scene, double until_s, const fs::path& file,
                     const std::function<void(double)>& progress) {
-  const Kinematics kinematics = KinematicsOf(recording);
   SceneView drawn = scene;
-  drawn.stereo = {};  // One camera, and one picture.
+  drawn.stereo = {};  // One picture, whatever display the session had.
+  const Kinematics kinematics = ReadKinematics(recording, drawn).kinematics;
   Projector projector(recording, drawn);
-  const double end_s = until_s >= 0 ? std::min(until_s, projector.end_s()) : projector.end_s();
+  const double end_s = LastRow(projector.end_s(), until_s);
   const auto count = static_cast<std::uint64_t>(std::floor(end_s * kVideoRate_Hz + 1e-6)) + 1;
   render::Bitmap picture;
   projector.GoTo(0);
   if (!projector.Draw(&picture)) throw std::runtime_error(recording.string() + ": has no tissue to show");
   Episode episode;
-  VideoFile video(file, picture.width, picture.height, kVideoRate_Hz);
+  VideoFile video(file, picture.width, picture.height, kVideoRate_Hz, kPicturesInGroup);
   for (std::uint64_t i = 0; i < count; ++i) {
     projector.GoTo(TimeOf(i));
     RenderReplay& replay = projector.replay();
     KinematicState state = kinematics.At(replay.session_start_ns() + std::llround(1e9 * TimeOf(i)));
     if (i > 0) KeepSigns(episode.states.back(), &state);
-    ShowInstruments(state, scene, &replay.node());
+    ShowInstruments(state, drawn, &replay.node());
     replay.node().DrawFrom(replay.node().camera(), &picture);
     video.Add(picture);
     for (std::size_t p = 0; p + 2 < picture.rgb.size(); p += 3 * kPixelStep) {
@@ -193,7 +206,7 @@ Episode DrawEpisode(const fs::path& recording, const SceneView& scene, double un
     episode.states.push_back(state);
     if (progress) progress(TimeOf(i));
   }
-  video.Finish(std::string(scene.name), {}, TimeOf(count));
+  video.Finish(std::string(drawn.name), {}, TimeOf(count));
   return episode;
 }
 
@@ -226,19 +239,21 @@ class LerobotSet {
  public:
   LerobotSet(fs::path folder, const Layout& layout) : folder_(std::move(folder)), layout_(layout) { Make("meta"); }
 
-  void Add(const fs::path& recording, const SceneView& scene, double until_s,
+  void Add(const LerobotSettings::Session& session, const SceneView& scene, double until_s,
            const std::function<void(double)>& progress) {
     const auto number = static_cast<int>(episodes_);
     const std::string chunk = Format("chunk-%03d", number / kEpisodesInChunk), file = Format("episode_%06d", number);
     Make(fs::path("data") / chunk);
     Make(fs::path("videos") / chunk / kCamera);
-    const Episode episode =
-        DrawEpisode(recording, scene, until_s, folder_ / "videos" / chunk / kCamera / (file + ".mp4"), progress);
+    const Episode episode = DrawEpisode(session.recording, scene, until_s,
+                                        folder_ / "videos" / chunk / kCamera / (file + ".mp4"), progress);
     const std::uint64_t frames = episode.states.size();
-    const std::size_t task = TaskOf(std::string(scene.name));
+    const std::size_t task = TaskNumber(session.task.empty() ? std::string(scene.name) : session.task);
     const auto columns =
         ColumnsOf(episode, layout_, number, static_cast<std::int64_t>(result_.frames), static_cast<std::int64_t>(task));
-    WriteBytes(folder_ / "data" / chunk / (file + ".parquet"), ParquetOf(columns));
+    const std::vector<std::uint8_t> table = ParquetOf(columns);
+    Replace(folder_ / "data" / chunk / (file + ".parquet"),
+            {reinterpret_cast<const char*>(table.data()), table.size()});
     lines_ += Format("{\"episode_index\": %d, \"tasks\": [", number) + JsonString(tasks_[task]) +
               Format("], \"length\": %llu}\n", static_cast<unsigned long long>(frames));
     statistics_ +=
@@ -260,24 +275,26 @@ class LerobotSet {
     fs::create_directories(folder_ / below, error);
     if (error) throw InputError(folder_.string() + ": cannot be made: " + error.message());
   }
-  std::size_t TaskOf(const std::string& scene) {
-    const auto found = std::find(tasks_.begin(), tasks_.end(), scene);
+  std::size_t TaskNumber(const std::string& task) {
+    const auto found = std::find(tasks_.begin(), tasks_.end(), task);
     if (found != tasks_.end()) return static_cast<std::size_t>(found - tasks_.begin());
-    tasks_.push_back(scene);
+    tasks_.push_back(task);
     return tasks_.size() - 1;
   }
-  /// After each episode, so that a set that was interrupted has whole episodes.
+  /// After video and table of each episode, info.json last: in a set that was interrupted, the episodes that it counts
+  /// are whole.
   void WriteMeta() const {
     std::string tasks;
     for (std::size_t i = 0; i < tasks_.size(); ++i) {
       tasks += Format("{\"task_index\": %zu, \"task\": ", i) + JsonString(tasks_[i]) + "}\n";
     }
-    WriteText(folder_ / "meta/tasks.jsonl", tasks);
-    WriteText(folder_ / "meta/episodes.jsonl", lines_);
-    WriteText(folder_ / "meta/episodes_stats.jsonl", statistics_);
-    WriteText(folder_ / "meta/info.json", InfoText());
+    Replace(folder_ / "meta/tasks.jsonl", tasks);
+    Replace(folder_ / "meta/episodes.jsonl", lines_);
+    Replace(folder_ / "meta/episodes_stats.jsonl", statistics_);
+    Replace(folder_ / "meta/info.json", InfoText());
   }
   [[nodiscard]] std::string InfoText() const {
+    const int width = VideoSize(static_cast<int>(layout_.width)), height = VideoSize(static_cast<int>(layout_.height));
     const auto vector = [](const char* name, const std::vector<std::string>& names) {
       return Format("    \"%s\": {\"dtype\": \"float32\", \"shape\": [%zu], \"names\": ", name, names.size()) +
              JsonList(names) + "},\n";
@@ -294,14 +311,14 @@ class LerobotSet {
         "  \"video_path\": \"videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4\",\n"
         "  \"features\": {\n";
     text += Format(
-        "    \"%s\": {\"dtype\": \"video\", \"shape\": [%u, %u, 3], \"names\": [\"height\", \"width\", "
+        "    \"%s\": {\"dtype\": \"video\", \"shape\": [%d, %d, 3], \"names\": [\"height\", \"width\", "
         "\"channels\"],\n",
-        kCamera, layout_.height, layout_.width);
+        kCamera, height, width);
     text += Format(
-        "      \"info\": {\"video.fps\": %d, \"video.height\": %u, \"video.width\": %u, \"video.channels\": 3, "
+        "      \"info\": {\"video.fps\": %d, \"video.height\": %d, \"video.width\": %d, \"video.channels\": 3, "
         "\"video.codec\": \"h264\", \"video.pix_fmt\": \"yuv420p\", \"video.is_depth_map\": false, "
         "\"has_audio\": false}},\n",
-        kVideoRate_Hz, layout_.height, layout_.width);
+        kVideoRate_Hz, height, width);
     text += vector("observation.state", layout_.names) + vector("action", layout_.action_names);
     text += "    \"timestamp\": {\"dtype\": \"float32\", \"shape\": [1], \"names\": null},\n";
     for (const char* name : {"frame_index", "episode_index", "index", "task_index"}) {
@@ -344,10 +361,14 @@ LerobotResult MakeLerobot(const LerobotSettings& settings, const std::function<v
     }
     layout = own;
   }
+  for (const auto& session : settings.sessions) {
+    const scene::SceneFile scene(session.scene);
+    Check(session.recording, scene.view(), settings.until_s);
+  }
   LerobotSet set(settings.folder, *layout);
   for (const auto& session : settings.sessions) {
     const scene::SceneFile scene(session.scene);
-    set.Add(session.recording, scene.view(), settings.until_s, progress);
+    set.Add(session, scene.view(), settings.until_s, progress);
   }
   return set.result();
 }

@@ -165,8 +165,13 @@ void ReadLerobot(const CommandLine& line, Options* options) {
   if (options->lerobot.folder.empty()) {
     throw InputError("--lerobot: needs the name of a new folder, for example lerobot");
   }
+  for (const char* option : {"every", "baseline", "vary", "seed"}) {
+    if (line.IsGiven(option)) {
+      throw InputError(std::string("--") + option + " cannot be combined with --lerobot; it goes with --dataset");
+    }
+  }
   for (const std::filesystem::path& recording : RecordingsOf(line)) {
-    options->lerobot.sessions.push_back({recording, SceneOf(line, recording)});
+    options->lerobot.sessions.push_back({recording, SceneOf(line, recording), {}});
   }
 }
 

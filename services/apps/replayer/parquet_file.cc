@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <initializer_list>
+#include <stdexcept>
 #include <string_view>
 
 namespace fulcrum::replay {
@@ -215,11 +216,18 @@ Struct AppendColumn(const ParquetColumn& column, Bytes* file) {
 }  // namespace
 
 std::vector<std::uint8_t> ParquetOf(std::span<const ParquetColumn> columns) {
+  if (columns.empty()) throw std::logic_error("ParquetOf: there is no column");
+  const std::size_t row_count = ValuesOf(columns.front()) / std::max<std::size_t>(1, columns.front().length);
+  for (const ParquetColumn& column : columns) {
+    // A file with another number would be read, with rows that do not belong together.
+    if (row_count == 0 || ValuesOf(column) != row_count * std::max<std::size_t>(1, column.length)) {
+      throw std::logic_error("ParquetOf: column \"" + column.name + "\" has not as many rows as the first, at least 1");
+    }
+  }
   Bytes file(kMagic.begin(), kMagic.end());
   std::vector<Struct> chunks;
   for (const ParquetColumn& column : columns) chunks.push_back(AppendColumn(column, &file));
-  const auto length = std::max<std::size_t>(1, columns.front().length);
-  const auto rows = static_cast<std::int64_t>(ValuesOf(columns.front()) / length);
+  const auto rows = static_cast<std::int64_t>(row_count);
   std::vector<Struct> groups(1);
   groups.front().Structs(1, chunks);
   groups.front().Integer(2, static_cast<std::int64_t>(file.size() - kMagic.size()), true);

@@ -17,8 +17,8 @@ struct ParquetColumn {
   std::size_t length = 0;  ///< 0: a value a row; otherwise each row is a list of so many values.
 };
 
-/// No value is null. Equal tables give equal bytes.
-/// @pre there is at least one column; all have as many rows, at least one.
+/// No value is null. Equal tables give equal bytes. Throws std::logic_error unless there is at least one column and all
+/// have equally many rows, at least one.
 [[nodiscard]] std::vector<std::uint8_t> ParquetOf(std::span<const ParquetColumn> columns);
 
 }  // namespace fulcrum::replay

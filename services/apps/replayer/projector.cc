@@ -6,7 +6,6 @@
 
 #include "services/apps/replayer/session_facts.h"
 #include "services/base/core/error.h"
-#include "services/records/recording/mcap_reader.h"
 
 namespace fulcrum::replay {
 namespace {
@@ -16,10 +15,7 @@ constexpr double kStep_s = 1.0 / 30;
 constexpr double kLongest_s = 7 * 24 * 3600.0;  // As of fulcrum up.
 
 double EndOf(const std::filesystem::path& recording, std::int64_t start_ns) {
-  recording::McapReader reader(recording, recording::McapReader::Depth::kChunkHeads);
-  for (recording::McapMessage none{}; reader.Next(&none);) {
-  }
-  return 1e-9 * static_cast<double>(static_cast<std::int64_t>(reader.last_ns()) - ClockOffset(reader) - start_ns);
+  return 1e-9 * static_cast<double>(ClockOf(recording).last_ns - start_ns);
 }
 
 }  // namespace

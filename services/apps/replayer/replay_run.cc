@@ -19,6 +19,7 @@
 #include "services/apps/replayer/video.h"
 #include "services/apps/replayer/what_if.h"
 #include "services/apps/replayer/what_if_report.h"
+#include "services/base/config/strict_yaml.h"
 #include "services/base/core/error.h"
 #include "services/base/core/exit_code.h"
 #include "services/base/runtime/realtime.h"
@@ -88,6 +89,17 @@ std::function<void(double)> BeginFiles(const ProgressLine& progress) {
   };
 }
 
+/// What the scene's description says of it, if the scene has one, otherwise its name.
+std::string TaskOf(const std::filesystem::path& file) {
+  const scene::SceneFile scene(file);
+  const std::string yaml = scene.source_yaml();
+  std::string task;
+  if (!yaml.empty()) {
+    task = config::StrictYaml::FromText(yaml, file.string()).root().TextOr("description", "");
+  }
+  return task.empty() ? std::string(scene.view().name) : task;
+}
+
 }  // namespace
 
 int RunFilm(const Options& options) {
@@ -134,10 +146,12 @@ int RunLerobot(const Options& options) {
   const ProgressLine progress(options.quiet);
   LerobotSettings settings = options.lerobot;
   settings.until_s = options.lock_step.until_s;
+  for (LerobotSettings::Session& session : settings.sessions) session.task = TaskOf(session.scene);
   const LerobotResult result = MakeLerobot(settings, BeginFiles(progress));
   progress.Clear();
-  std::cout << settings.folder.string() << ": " << settings.sessions.size() << " episodes, " << result.frames
-            << " frames, " << result.duration_s << " s\n";
+  std::cout << settings.folder.string() << ": " << settings.sessions.size()
+            << (settings.sessions.size() == 1 ? " episode, " : " episodes, ") << result.frames
+            << (result.frames == 1 ? " frame, " : " frames, ") << result.duration_s << " s\n";
   if (!options.json.empty()) {
     WriteText(options.json,
               Format("{\n  \"episodes\": %zu,\n  \"frames\": %llu,\n  \"duration_s\": %.3f\n}\n",

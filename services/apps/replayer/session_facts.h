@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <filesystem>
 
 #include "services/base/config/cart.h"
 #include "services/base/core/messages.h"
@@ -29,6 +30,20 @@ namespace fulcrum::replay {
   if (clock == reader.metadata().end()) return 0;
   const auto offset = clock->second.find("log_time_minus_monotonic_ns");
   return offset == clock->second.end() ? 0 : std::strtoll(offset->second.c_str(), nullptr, 10);
+}
+
+struct RecordedClock {
+  std::int64_t offset_ns;  ///< ClockOffset().
+  std::int64_t last_ns;    ///< Log time of the last message on the clock of the stamps [ns].
+};
+
+/// Reads the heads of the chunks only. Throws InputError.
+[[nodiscard]] inline RecordedClock ClockOf(const std::filesystem::path& recording) {
+  recording::McapReader reader(recording, recording::McapReader::Depth::kChunkHeads);
+  for (recording::McapMessage none{}; reader.Next(&none);) {
+  }
+  const std::int64_t offset_ns = ClockOffset(reader);
+  return {offset_ns, static_cast<std::int64_t>(reader.last_ns()) - offset_ns};
 }
 
 using recording::RefuseOtherScene;

@@ -102,9 +102,9 @@ void WriteMetadata(const fs::path& file, const std::string& title, std::span<con
   if (!out.flush()) throw InputError("cannot write " + file.string());
 }
 
-/// A picture's bottom row comes first; H.264 wants even sizes. Colours as in television of high definition, because a
-/// player takes them for that.
-Words Encoding(int width, int height, int rate_Hz, const fs::path& file) {
+/// A picture's bottom row comes first; the size becomes VideoSize(). Colours as in television of high definition,
+/// because a player takes them for that.
+Words Encoding(int width, int height, int rate_Hz, int group, const fs::path& file) {
   return {"-f",
           "rawvideo",
           "-pix_fmt",
@@ -116,7 +116,8 @@ Words Encoding(int width, int height, int rate_Hz, const fs::path& file) {
           "-i",
           "pipe:0",
           "-vf",
-          "vflip,pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv",
+          "vflip,pad=" + std::to_string(VideoSize(width)) + ":" + std::to_string(VideoSize(height)) +
+              ",scale=out_color_matrix=bt709:out_range=tv",
           "-colorspace",
           "bt709",
           "-color_primaries",
@@ -134,7 +135,7 @@ Words Encoding(int width, int height, int rate_Hz, const fs::path& file) {
           "-pix_fmt",
           "yuv420p",
           "-g",
-          std::to_string(2 * rate_Hz),  // A player finds a place within two seconds.
+          std::to_string(group > 0 ? group : 2 * rate_Hz),  // A player finds a place within two seconds.
           "-f",
           "mp4",
           file.string()};
@@ -164,16 +165,16 @@ struct VideoFile::Impl {
     const fs::path pictures, metadata, complete;
   };
 
-  Impl(fs::path to, int width, int height, int rate_Hz)
-      : file(std::move(to)), parts(file), encoder(Encoding(width, height, rate_Hz, parts.pictures)) {}
+  Impl(fs::path to, int width, int height, int rate_Hz, int group)
+      : file(std::move(to)), parts(file), encoder(Encoding(width, height, rate_Hz, group, parts.pictures)) {}
 
   const fs::path file;
   const Parts parts;
   Run encoder;
 };
 
-VideoFile::VideoFile(fs::path file, int width, int height, int rate_Hz)
-    : impl_(std::make_unique<Impl>(std::move(file), width, height, rate_Hz)) {}
+VideoFile::VideoFile(fs::path file, int width, int height, int rate_Hz, int group)
+    : impl_(std::make_unique<Impl>(std::move(file), width, height, rate_Hz, group)) {}
 
 VideoFile::~VideoFile() = default;
 

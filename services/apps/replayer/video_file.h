@@ -11,10 +11,15 @@
 
 namespace fulcrum::replay {
 
+/// Width or height of the video of pictures with this one [pixels]: H.264 wants even sizes.
+[[nodiscard]] constexpr int VideoSize(int picture_size) { return picture_size + picture_size % 2; }
+
 class VideoFile {
  public:
-  /// @param rate_Hz pictures a second. Throws InputError when ffmpeg is not installed or `file` cannot be written.
-  VideoFile(std::filesystem::path file, int width, int height, int rate_Hz);
+  /// @param rate_Hz pictures a second.
+  /// @param group pictures from one that can be decoded alone to the next; 0: two seconds of them.
+  /// Throws InputError when ffmpeg is not installed or `file` cannot be written.
+  VideoFile(std::filesystem::path file, int width, int height, int rate_Hz, int group = 0);
   /// Without Finish() nothing remains.
   ~VideoFile();
   VideoFile(const VideoFile&) = delete;

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 #include <string>
 
 #include "services/apps/replayer/kinematics.h"
@@ -44,6 +45,35 @@ TEST(ParquetFile, HasEachValueAtItsPlace) {
     EXPECT_EQ(number.values[row], std::vector<double>{std::ldexp(i, 40) - 7});
     EXPECT_EQ(is.values[row], std::vector<double>{static_cast<double>(i % 2)});
   }
+}
+
+TEST(ParquetFile, HasTheSchemaOfLists) {
+  // LogicalTypes.md of the format: a list is a group LIST of one repeated group "list" of one "element".
+  const auto table = fulcrum::testing::ReadParquet(
+      FileOf({{"pair", std::vector<float>{1, 2, 3, 4}, 2}, {"number", std::vector<std::int64_t>{5, 6}}}));
+  using Element = fulcrum::testing::ParquetTable::Element;
+  constexpr int kNone = -1, kFloat = 4, kInt64 = 2, kRequired = 0, kRepeated = 2, kList = 3;
+  EXPECT_EQ(table.schema, (std::vector<Element>{{"schema", kNone, kNone, 2, kNone},
+                                                {"pair", kNone, kRequired, 1, kList},
+                                                {"list", kNone, kRepeated, 1, kNone},
+                                                {"element", kFloat, kRequired, kNone, kNone},
+                                                {"number", kInt64, kRequired, kNone, kNone}}));
+  const auto &pair = table.columns.at("pair"), &number = table.columns.at("number");
+  EXPECT_EQ(pair.path, (std::vector<std::string>{"pair", "list", "element"}));
+  EXPECT_EQ(number.path, std::vector<std::string>{"number"});
+  for (const auto* column : {&pair, &number}) {
+    EXPECT_EQ(column->codec, 0) << "not compressed";
+    EXPECT_EQ(column->encodings, (std::vector<int>{0, 3})) << "values PLAIN, levels RLE";
+    EXPECT_EQ(column->page_encodings, (std::vector<int>{0, 3, 3}));
+  }
+}
+
+TEST(ParquetFile, RefusesColumnsOfOtherLengths) {
+  const std::vector<std::int64_t> two{1, 2}, three{1, 2, 3};
+  EXPECT_THROW((void)ParquetOf({}), std::logic_error);
+  EXPECT_THROW((void)FileOf({{"a", std::vector<float>{}}}), std::logic_error);
+  EXPECT_THROW((void)FileOf({{"a", two}, {"b", three}}), std::logic_error);
+  EXPECT_THROW((void)FileOf({{"a", two, 2}, {"b", three, 2}}), std::logic_error) << "half a list";
 }
 
 TEST(ParquetFile, HasTheseBytes) {
