@@ -1,11 +1,8 @@
 #include "tests/benchmark/report.h"
 
-#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <limits>
 
 namespace fulcrum::benchmark {
 
@@ -32,15 +29,6 @@ void Report::Add(std::string_view key, double value, std::string_view unit) {
   std::printf("%.*s %.6g %.*s\n", static_cast<int>(key.size()), key.data(), value, static_cast<int>(unit.size()),
               unit.data());
   std::fflush(stdout);
-}
-
-double Quantile(std::vector<double> values, double q) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  std::sort(values.begin(), values.end());
-  const double position = q * static_cast<double>(values.size() - 1);
-  const auto low = static_cast<std::size_t>(position);
-  const std::size_t high = std::min(low + 1, values.size() - 1);
-  return std::lerp(values[low], values[high], position - static_cast<double>(low));
 }
 
 std::vector<double> TimeMs(int warmup, int repeats, const std::function<void()>& body) {

@@ -12,6 +12,8 @@
 #include <string_view>
 #include <vector>
 
+#include "tests/support/quantile.h"
+
 namespace fulcrum::benchmark {
 
 class Report {
@@ -28,9 +30,6 @@ class Report {
   bool quick_ = false;
   std::string prefix_;
 };
-
-/// Quantile of a sample, linear between order statistics. Empty: NaN.
-[[nodiscard]] double Quantile(std::vector<double> values, double q);
 
 /// Wall time of `body` in ms, `repeats` times after `warmup` runs.
 [[nodiscard]] std::vector<double> TimeMs(int warmup, int repeats, const std::function<void()>& body);

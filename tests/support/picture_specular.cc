@@ -4,13 +4,15 @@
 #include <utility>
 
 #include "render_node/geometry/texel.h"
-#include "tests/benchmark/report.h"
 #include "tests/support/picture_statistics.h"
+#include "tests/support/quantile.h"
 
 namespace fulcrum::render {
 namespace {
 
 using Channel = std::vector<std::uint8_t>;
+
+using benchmark::Quantile;
 
 /// Connected pixels of a mask, diagonals included.
 class Components {
@@ -136,7 +138,7 @@ class ArnoldDetector {
     const auto bright = [&](const auto& values) {
       std::vector<double> all;
       for (const std::size_t pixel : pixels_) all.push_back(static_cast<double>(values[pixel]));
-      return pixels_.empty() ? 0.0 : benchmark::Quantile(all, 0.95);
+      return pixels_.empty() ? 0.0 : Quantile(all, 0.95);
     };
     const double grey = std::max(1.0, bright(grey_));
     green_ = bright(rgb_[1]) / grey;
@@ -187,6 +189,15 @@ class ArnoldDetector {
   double green_ = 1, blue_ = 1;  // Ratios of the bright quantiles to that of the grey value.
 };
 
+/// What either module finds.
+std::vector<char> SpecularOf(const ArnoldDetector& detector, const SpecularThresholds& thresholds) {
+  std::vector<char> mask = detector.Absolute(thresholds.t1);
+  if (detector.size() == 0) return mask;
+  const std::vector<char> relative = detector.Relative(thresholds.t2_abs, thresholds.t2);
+  for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = static_cast<char>(mask[i] | relative[i]);
+  return mask;
+}
+
 }  // namespace
 
 std::vector<double> ComponentAreas(std::span<const char> mask, int width) {
@@ -197,12 +208,7 @@ std::vector<double> ComponentAreas(std::span<const char> mask, int width) {
 }
 
 std::vector<char> SpecularPixels(const Bitmap& picture, const RoundField& field, const SpecularThresholds& thresholds) {
-  const ArnoldDetector detector(picture, field);
-  std::vector<char> mask = detector.Absolute(thresholds.t1);
-  if (detector.size() == 0) return mask;
-  const std::vector<char> relative = detector.Relative(thresholds.t2_abs, thresholds.t2);
-  for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = static_cast<char>(mask[i] | relative[i]);
-  return mask;
+  return SpecularOf(ArnoldDetector(picture, field), thresholds);
 }
 
 SpecularStatistics MeasureSpecular(const Bitmap& picture, const RoundField& field,
@@ -213,14 +219,14 @@ SpecularStatistics MeasureSpecular(const Bitmap& picture, const RoundField& fiel
   const auto share = [&](const std::vector<char>& mask) {
     return static_cast<double>(std::ranges::count(mask, char{1})) / static_cast<double>(detector.size());
   };
-  const std::vector<char> mask = SpecularPixels(picture, field, thresholds);
+  const std::vector<char> mask = SpecularOf(detector, thresholds);
   statistics.share = share(mask);
   statistics.near_white = share(detector.Absolute(thresholds.t1));
   const std::vector<double> areas = ComponentAreas(mask, picture.width);
   statistics.spots = areas.size();
   if (!areas.empty()) {
-    statistics.area_p50 = benchmark::Quantile(areas, 0.5);
-    statistics.area_p90 = benchmark::Quantile(areas, 0.9);
+    statistics.area_p50 = Quantile(areas, 0.5);
+    statistics.area_p90 = Quantile(areas, 0.9);
   }
   return statistics;
 }

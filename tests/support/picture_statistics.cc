@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "render_node/geometry/texel.h"
-#include "tests/benchmark/report.h"
+#include "tests/support/quantile.h"
 
 namespace fulcrum::render {
 namespace {

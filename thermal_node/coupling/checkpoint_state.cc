@@ -283,8 +283,9 @@ struct SolidSurface::Record {
 
   [[nodiscard]] bool Plausible() const {
     constexpr float kMost_m2 = 100;
-    return layout == kSolidLayout && used <= 1 && highest_C >= 0 && std::isfinite(highest_C + power_W) &&
-           AllWithin(dead_m2, 0, kMost_m2) && AllWithin(reported_m2, 0, kMost_m2) &&
+    return layout == kSolidLayout && used <= 1 && warned >> kMaxSolids == 0 && highest_C >= 0 &&
+           std::isfinite(highest_C + power_W) && AllWithin(dead_m2, 0, kMost_m2) &&
+           AllWithin(reported_m2, 0, kMost_m2) &&
            std::isfinite(ledger.joule + ledger.generator + ledger.Out() + ledger.hook + ledger.film + ledger.plume);
   }
 };

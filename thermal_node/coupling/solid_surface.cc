@@ -110,7 +110,7 @@ void SolidSurface::CountCells(const Tile& tile, std::array<Count, kMaxSolids>* c
                                    [&](Index i) { return charts_.charts[i].Contains(cell.ix, cell.iy); });
     const Index solid = here != charts.end() ? charts_.charts[*here].solid : 0;
     Count& count = (*counts)[solid];
-    if (theta > count.theta) {
+    if (!count.hottest || theta > count.theta) {
       count.theta = theta;
       count.hottest = cell;
     }
@@ -129,9 +129,9 @@ void SolidSurface::MeasureBurns() {
   for (Index solid = 0; solid < kMaxSolids; ++solid) {
     const Count& count = counts[solid];
     const float hottest_C = material_.body_C + count.theta;
-    if (!warned(solid) && (hottest_C >= kWarning_C || count.omega >= kWarningOmega)) {
+    if (count.hottest && !warned(solid) && (hottest_C >= kWarning_C || count.omega >= kWarningOmega)) {
       warned_ |= 1u << solid;
-      warnings_.push_back({solid, field_.sheet().CentreOf(count.hottest), hottest_C});
+      warnings_.push_back({solid, field_.sheet().CentreOf(*count.hottest), hottest_C});
     }
     dead_m2_[solid] = static_cast<float>(count.dead) * kSolidCell_m * kSolidCell_m;
     float& reported_m2 = reported_m2_[solid];

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -103,9 +104,10 @@ class SolidSurface {
   /// What the cells of a solid show.
   struct Count {
     double dead = 0;  ///< Area of its dead cells, in cells.
-    CellIndex last_dead, hottest;
-    float theta = -1;  ///< Of the hottest cell [K].
-    float omega = 0;   ///< Largest damage integral of cell death.
+    CellIndex last_dead;
+    std::optional<CellIndex> hottest;  ///< None: no cell of the solid was heated.
+    float theta = 0;                   ///< Of the hottest cell [K].
+    float omega = 0;                   ///< Largest damage integral of cell death.
   };
   void MeasureBurns();
   /// Solid of a place in the charts; kNoIndex: none.

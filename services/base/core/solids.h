@@ -26,7 +26,7 @@ inline constexpr Index kMaxSolids = 25;  ///< Of a scene: the organ and others.
   return scene.tube_vertex_count > 0 ? 1 : 0;
 }
 
-/// Whether a burn of this solid is harm to an organ: fat is what the hook goes through on its way to them.
+/// Whether burning this solid harms an organ; fat does not count, because a dissection goes through it.
 [[nodiscard]] inline bool IsOrgan(const TissueScene& scene, Index solid) {
   return scene.solids.empty() || (solid < scene.solids.size() && scene.solids[solid].look != SolidLook::kFat);
 }

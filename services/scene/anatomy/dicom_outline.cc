@@ -1,7 +1,12 @@
 #include "services/scene/anatomy/dicom_outline.h"
 
+// DCMTK wants this one first.
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dctag.h>
+
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
@@ -38,10 +43,13 @@ std::string TagText(std::uint32_t tag) {
 
 class Outline {
  public:
-  explicit Outline(const fs::path& file) : file_(file), in_(file, std::ios::binary) {
+  explicit Outline(const fs::path& file) : file_(file) {
+    errno = 0;
+    in_.open(file, std::ios::binary);
+    if (!in_) RefuseUnreadable(errno);
     std::error_code error;
     size_ = fs::file_size(file, error);
-    if (!in_ || error) Refuse("cannot be read");
+    if (error) RefuseUnreadable(error.value());
   }
 
   /// The group of elements before the data, always explicit and little-endian.
@@ -91,6 +99,16 @@ class Outline {
   };
 
   [[noreturn]] void Refuse(const std::string& reason) const { throw InputError(file_.string() + ": " + reason); }
+  /// `error`: errno; 0: unknown.
+  [[noreturn]] void RefuseUnreadable(int error) const {
+    Refuse("cannot be read at byte " + std::to_string(at_) + (error != 0 ? ": " : "") +
+           (error != 0 ? std::strerror(error) : "") + "; check its permissions and its disk, or copy it again");
+  }
+
+  [[noreturn]] void RefuseOpen(const std::string& what) const {
+    Refuse("ends " + what + " of unknown length at byte " + std::to_string(at_) +
+           " without its delimiter: it is cut short or damaged; export or copy it again");
+  }
 
   /// The next bytes, at most 64, without moving on.
   const char* Peek(std::size_t count) {
@@ -100,8 +118,9 @@ class Outline {
     if (at_ < window_at_ || at_ + count > window_at_ + window_.size()) {
       window_at_ = at_;
       window_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(kWindow_B, size_ - at_)));
+      errno = 0;
       in_.seekg(static_cast<std::streamoff>(at_));
-      if (!in_.read(window_.data(), static_cast<std::streamsize>(window_.size()))) Refuse("cannot be read");
+      if (!in_.read(window_.data(), static_cast<std::streamsize>(window_.size()))) RefuseUnreadable(errno);
     }
     return window_.data() + (at_ - window_at_);
   }
@@ -172,6 +191,17 @@ class Outline {
     }
   }
 
+  /// Whether an element of known length without a type is a sequence. DCMTK takes the type from its dictionary, and any
+  /// value may begin as an item does. Of one that the dictionary does not know, and of private ones, the beginning
+  /// decides.
+  bool HasItems(const Header& header, std::uint64_t end) {
+    if (header.tag == kPixelData) return false;
+    if (header.length < 8 || end - at_ < 4 || std::memcmp(Peek(4), "\xfe\xff\x00\xe0", 4) != 0) return false;
+    const auto group = static_cast<Uint16>(header.tag >> 16), element = static_cast<Uint16>(header.tag & 0xffff);
+    const DcmEVR type = DcmTag(group, element).getEVR();
+    return group % 2 == 1 || type == EVR_SQ || type == EVR_UNKNOWN;
+  }
+
   /// Elements up to `end`, or up to the delimiter of an item of unknown length.
   void Elements(std::uint64_t end, bool is_delimited, int level, bool is_explicit) {
     std::uint32_t last = 0;
@@ -189,16 +219,15 @@ class Outline {
         Refuse("element " + TagText(header.tag) + " before byte " + std::to_string(at_) +
                " is a value without a length: the file is damaged; export it again");
       }
-      // Without types a sequence is known by the item at its beginning. One of unknown type is implicit within.
-      const bool has_items =
-          !is_explicit && header.length >= 8 && end - at_ >= 4 && std::memcmp(Peek(4), "\xfe\xff\x00\xe0", 4) == 0;
+      const bool has_items = !is_explicit && !has_unknown_length && HasItems(header, end);
+      // One of unknown type is implicit within.
       if (has_unknown_length || (is_explicit && vr == "SQ") || has_items) {
         Items(has_unknown_length ? end : at_ + header.length, has_unknown_length, level, is_explicit && vr != "UN");
       } else {
         at_ += header.length;
       }
     }
-    if (is_delimited) Refuse("ends within an item: it is cut short or damaged; export or copy it again");
+    if (is_delimited) RefuseOpen("an item");
   }
 
   void Items(std::uint64_t end, bool is_delimited, int level, bool is_explicit) {
@@ -218,7 +247,7 @@ class Outline {
       }
       Elements(has_unknown_length ? end : at_ + header.length, has_unknown_length, level + 1, is_explicit);
     }
-    if (is_delimited) Refuse("ends within a sequence: it is cut short or damaged; export or copy it again");
+    if (is_delimited) RefuseOpen("a sequence");
   }
 
   static constexpr std::size_t kWindow_B = 65536;

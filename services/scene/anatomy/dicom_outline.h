@@ -1,6 +1,6 @@
-// The outline of a DICOM file: how its elements nest, checked before DCMTK reads it. DCMTK 3.6.7 calls itself for each
-// level of nesting, so that 400 kB of nested sequences overflow its stack; it searches where elements are out of order,
-// which takes a time of the square of their number; and it holds each element in some hundred bytes.
+// The outline of a DICOM file: how its elements nest, checked before DCMTK reads it. DCMTK 3.6.7 recurses
+// into each level of nesting, so that 400 kB of nested sequences overflow its stack; it searches where elements are out
+// of order, which takes a time of the square of their number; and it holds each element in some hundred bytes.
 #pragma once
 
 #include <filesystem>

@@ -7,17 +7,15 @@
 #include <dcmtk/dcmdata/dcfilefo.h>
 #include <dcmtk/dcmdata/dcsequen.h>
 #include <dcmtk/dcmdata/dcspchrs.h>
-#include <dcmtk/dcmdata/dctag.h>
 #include <dcmtk/dcmdata/dcuid.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numeric>
 #include <optional>
 
 #include "services/base/core/error.h"
-#include "services/base/core/utf8.h"
+#include "services/scene/anatomy/dicom_elements.h"
 #include "services/scene/anatomy/dicom_outline.h"
 
 namespace fulcrum::scene {
@@ -30,30 +28,6 @@ constexpr double kShortest_mm = 0.01, kLongest_mm = 100;  ///< Of a voxel's edge
 constexpr double kMostOff = 0.05;
 constexpr double kSame_mm = kShortest_mm;  ///< Frames nearer to each other are of one slice.
 constexpr int kMostFrames = 1'000'000;
-
-/// One line of printable UTF-8, at most 64 bytes.
-std::string Printable(const OFString& value) {
-  const std::string text(value.data(), value.size());
-  std::string line;
-  for (std::size_t at = 0; at < text.size() && line.size() < 61;) {
-    const std::size_t length = Utf8Length(text, at);
-    const bool is_plain = length > 0 && static_cast<unsigned char>(text[at]) >= ' ' && text[at] != 0x7f;
-    line += is_plain ? text.substr(at, length) : "?";
-    at += std::max<std::size_t>(length, 1);
-  }
-  return line;
-}
-
-std::string NameOf(const DcmTagKey& key) {
-  DcmTag tag(key);
-  return std::string(tag.getTagName()) + " " + key.toString().c_str();
-}
-
-std::string Number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.6g", value);
-  return text;
-}
 
 void RefuseOtherClass(const fs::path& file, const std::string& uid) {
   if (uid == UID_SegmentationStorage) return;
@@ -76,16 +50,28 @@ struct Frame {
   int slice = 0;
 };
 
-/// The axes and the spacing of a frame.
-struct Plane {
-  Vec3d row = Vec3d::Zero(), column = Vec3d::Zero();  ///< Directions in which i and j grow, LPS.
-  double along_row = 0, along_column = 0;             ///< Spacing of voxels [mm].
-  std::optional<double> between_slices;               ///< [mm]
+/// Directions in which i and j grow, LPS.
+struct Axes {
+  Vec3d row = Vec3d::Zero(), column = Vec3d::Zero();
 };
 
-class Reader {
+/// Of voxels [mm].
+struct Spacing {
+  double along_row = 0, along_column = 0;
+  std::optional<double> between_slices;
+};
+
+/// Functional groups of one frame, or shared by all.
+struct Groups {
+  std::optional<int> segment;
+  std::optional<Vec3d> corner;  ///< LPS [mm]
+  std::optional<Axes> axes;
+  std::optional<Spacing> spacing;
+};
+
+class Reader : private DicomElements {
  public:
-  explicit Reader(const fs::path& file) : path_(file) {
+  explicit Reader(const fs::path& file) : DicomElements(file) {
     OFLog::configure(OFLogger::OFF_LOG_LEVEL);  // Its messages would go to standard error.
     const OFCondition read = file_.loadFile(OFFilename(file.c_str()), EXS_Unknown, EGL_noChange);
     if (read.bad()) Refuse(std::string("cannot be read as DICOM: ") + read.text() + "; export it again");
@@ -104,55 +90,19 @@ class Reader {
   }
 
  private:
-  [[noreturn]] void Refuse(const std::string& reason) const { throw InputError(path_.string() + ": " + reason); }
-  [[noreturn]] void Refuse(const DcmTagKey& key, const std::string& where, const std::string& value,
-                           const std::string& valid) const {
-    Refuse(where + (where.empty() ? "" : ": ") + NameOf(key) + " is " + value + "; valid: " + valid);
-  }
   static std::string Place(std::size_t frame) { return "frame " + std::to_string(frame + 1); }
-
-  static std::string Text(DcmItem* item, const DcmTagKey& key) {
-    OFString value;
-    if (item->findAndGetOFStringArray(key, value).bad()) return "missing";
-    return "'" + Printable(value) + "'";
-  }
-
-  int Integer(DcmItem* item, const DcmTagKey& key, int low, int high, const std::string& where) const {
-    Uint16 unsigned_value = 0;
-    Sint32 value = -1;
-    // US, then IS.
-    const bool is_read = item->findAndGetUint16(key, unsigned_value).good();
-    if (is_read) value = unsigned_value;
-    if ((!is_read && item->findAndGetSint32(key, value).bad()) || value < low || value > high) {
-      Refuse(key, where, Text(item, key), std::to_string(low) + (low < high ? " to " + std::to_string(high) : ""));
-    }
-    return static_cast<int>(value);
-  }
-
-  template <int kCount>
-  Eigen::Matrix<double, kCount, 1> Numbers(DcmItem* item, const DcmTagKey& key, const std::string& where) const {
-    Eigen::Matrix<double, kCount, 1> numbers;
-    DcmElement* element = nullptr;
-    bool is_read = item->findAndGetElement(key, element).good() && element->getVM() == kCount;
-    for (int i = 0; i < kCount && is_read; ++i) {
-      is_read = element->getFloat64(numbers[i], static_cast<unsigned long>(i)).good() && std::abs(numbers[i]) <= 1e6;
-    }
-    if (!is_read) {
-      Refuse(key, where, Text(item, key),
-             std::to_string(kCount) + (kCount == 1 ? " number" : " numbers") + " up to 1e6");
-    }
-    return numbers;
-  }
 
   void CheckClass() const {
     OFString uid;
     (void)data_->findAndGetOFString(DCM_SOPClassUID, uid);
-    RefuseOtherClass(path_, Printable(uid));
-    if (data_->tagExistsWithValue(DCM_InConcatenationTotalNumber)) {
-      const DcmTagKey key = DCM_InConcatenationTotalNumber;
-      if (Integer(data_, key, 1, 65535, "") > 1) {
-        Refuse(key, "", Text(data_, key), "1: this is a part of a segmentation. Export it as one file");
-      }
+    RefuseOtherClass(path(), Printable(uid));
+    // A part must have the first two, but need not say how many parts there are.
+    const bool is_part = data_->tagExists(DCM_ConcatenationUID) || data_->tagExists(DCM_InConcatenationNumber) ||
+                         data_->tagExistsWithValue(DCM_InConcatenationTotalNumber);
+    const DcmTagKey key = DCM_InConcatenationTotalNumber;
+    Uint16 total = 0;
+    if (is_part && (data_->findAndGetUint16(key, total).bad() || total != 1)) {
+      Refuse(key, "", Text(data_, key), "1: this is a part of a segmentation. Export it as one file");
     }
   }
 
@@ -215,50 +165,68 @@ class Reader {
     }
   }
 
-  /// The item of a functional group, of the frame or shared.
-  DcmItem* Group(DcmItem* frame, DcmItem* shared, const DcmTagKey& key, std::size_t at) const {
-    DcmItem* group = nullptr;
-    if (frame->findAndGetSequenceItem(key, group).good() && group != nullptr) return group;
-    if (shared != nullptr && shared->findAndGetSequenceItem(key, group).good() && group != nullptr) return group;
+  /// What the functional groups of an item say; each may be missing.
+  Groups ReadGroups(DcmItem* item, const std::string& where) const {
+    const auto find = [&](const DcmTagKey& key) {
+      DcmItem* group = nullptr;
+      return item->findAndGetSequenceItem(key, group).good() ? group : nullptr;
+    };
+    Groups groups;
+    if (DcmItem* group = find(DCM_SegmentIdentificationSequence)) {
+      groups.segment = Integer(group, DCM_ReferencedSegmentNumber, 1, kMostLabel, where);
+    }
+    if (DcmItem* group = find(DCM_PlanePositionSequence)) {
+      groups.corner = Numbers<3>(group, DCM_ImagePositionPatient, where);
+    }
+    if (DcmItem* group = find(DCM_PlaneOrientationSequence)) groups.axes = ReadAxes(group, where);
+    if (DcmItem* group = find(DCM_PixelMeasuresSequence)) groups.spacing = ReadSpacing(group, where);
+    return groups;
+  }
+
+  Axes ReadAxes(DcmItem* group, const std::string& where) const {
+    const auto numbers = Numbers<6>(group, DCM_ImageOrientationPatient, where);
+    const Axes axes{numbers.head<3>(), numbers.tail<3>()};
+    if (std::abs(axes.row.norm() - 1) > 1e-3 || std::abs(axes.column.norm() - 1) > 1e-3 ||
+        std::abs(axes.row.dot(axes.column)) > 1e-3) {
+      Refuse(DCM_ImageOrientationPatient, where, Text(group, DCM_ImageOrientationPatient),
+             "two directions of length 1 at a right angle");
+    }
+    return axes;
+  }
+
+  Spacing ReadSpacing(DcmItem* group, const std::string& where) const {
+    const auto edge = [&](double length_mm, const DcmTagKey& key) {
+      if (length_mm >= kShortest_mm && length_mm <= kLongest_mm) return length_mm;
+      Refuse(key, where, Number(length_mm) + " mm", Number(kShortest_mm) + " to " + Number(kLongest_mm) + " mm");
+    };
+    const auto numbers = Numbers<2>(group, DCM_PixelSpacing, where);
+    Spacing spacing;
+    spacing.along_column = edge(numbers[0], DCM_PixelSpacing);
+    spacing.along_row = edge(numbers[1], DCM_PixelSpacing);
+    if (group->tagExistsWithValue(DCM_SpacingBetweenSlices)) {
+      spacing.between_slices = edge(Numbers<1>(group, DCM_SpacingBetweenSlices, where)[0], DCM_SpacingBetweenSlices);
+    }
+    return spacing;
+  }
+
+  /// What a frame says itself, else what is said for all.
+  template <class T>
+  T OwnOrShared(const std::optional<T>& own, const std::optional<T>& shared, const DcmTagKey& key,
+                std::size_t at) const {
+    if (own) return *own;
+    if (shared) return *shared;
     Refuse(Place(at) + " has no " + NameOf(key) +
            "; valid: one in PerFrameFunctionalGroupsSequence or SharedFunctionalGroupsSequence. Without it the place "
            "in the patient is not known");
   }
 
-  Plane ReadPlane(DcmItem* frame, DcmItem* shared, std::size_t at) const {
-    Plane plane;
-    const auto axes =
-        Numbers<6>(Group(frame, shared, DCM_PlaneOrientationSequence, at), DCM_ImageOrientationPatient, Place(at));
-    plane.row = axes.head<3>();
-    plane.column = axes.tail<3>();
-    if (std::abs(plane.row.norm() - 1) > 1e-3 || std::abs(plane.column.norm() - 1) > 1e-3 ||
-        std::abs(plane.row.dot(plane.column)) > 1e-3) {
-      Refuse(DCM_ImageOrientationPatient, Place(at),
-             Text(Group(frame, shared, DCM_PlaneOrientationSequence, at), DCM_ImageOrientationPatient),
-             "two directions of length 1 at a right angle");
-    }
-    DcmItem* measures = Group(frame, shared, DCM_PixelMeasuresSequence, at);
-    const auto spacing = Numbers<2>(measures, DCM_PixelSpacing, Place(at));
-    plane.along_column = Edge(spacing[0], DCM_PixelSpacing, at);
-    plane.along_row = Edge(spacing[1], DCM_PixelSpacing, at);
-    if (measures->tagExistsWithValue(DCM_SpacingBetweenSlices)) {
-      plane.between_slices =
-          Edge(Numbers<1>(measures, DCM_SpacingBetweenSlices, Place(at))[0], DCM_SpacingBetweenSlices, at);
-    }
-    return plane;
-  }
-  double Edge(double length_mm, const DcmTagKey& key, std::size_t at) const {
-    if (length_mm >= kShortest_mm && length_mm <= kLongest_mm) return length_mm;
-    Refuse(key, Place(at), Number(length_mm) + " mm", Number(kShortest_mm) + " to " + Number(kLongest_mm) + " mm");
-  }
-
-  void CheckSamePlane(const Plane& plane, std::size_t at) const {
+  void CheckSamePlane(const Axes& axes, const Spacing& spacing, std::size_t at) const {
     const auto differs = [](double a, double b) { return std::abs(a - b) > 1e-3 * b; };
-    const bool is_turned = (plane.row - plane_.row).norm() > 1e-3 || (plane.column - plane_.column).norm() > 1e-3;
-    const bool is_scaled = differs(plane.along_row, plane_.along_row) ||
-                           differs(plane.along_column, plane_.along_column) ||
-                           plane.between_slices.has_value() != plane_.between_slices.has_value() ||
-                           (plane_.between_slices && differs(*plane.between_slices, *plane_.between_slices));
+    const bool is_turned = (axes.row - axes_.row).norm() > 1e-3 || (axes.column - axes_.column).norm() > 1e-3;
+    const bool is_scaled = differs(spacing.along_row, spacing_.along_row) ||
+                           differs(spacing.along_column, spacing_.along_column) ||
+                           spacing.between_slices.has_value() != spacing_.between_slices.has_value() ||
+                           (spacing_.between_slices && differs(*spacing.between_slices, *spacing_.between_slices));
     if (is_turned || is_scaled) {
       Refuse(Place(at) + " has another " + (is_turned ? "ImageOrientationPatient (0020,0037)" : "spacing of voxels") +
              " than frame 1; valid: one grid for all. Resample the segmentation to one volume, as 3D Slicer does");
@@ -267,26 +235,33 @@ class Reader {
 
   void ReadFrames() {
     const int count = Integer(data_, DCM_NumberOfFrames, 1, kMostFrames, "");
-    DcmItem* shared = nullptr;
-    (void)data_->findAndGetSequenceItem(DCM_SharedFunctionalGroupsSequence, shared);
+    // Once: the shared item may be long.
+    DcmItem* for_all = nullptr;
+    Groups shared;
+    if (data_->findAndGetSequenceItem(DCM_SharedFunctionalGroupsSequence, for_all).good() && for_all != nullptr) {
+      shared = ReadGroups(for_all, "SharedFunctionalGroupsSequence");
+    }
     const std::size_t items = ForEachItem(DCM_PerFrameFunctionalGroupsSequence, [&](DcmItem* item, std::size_t at) {
       if (at >= static_cast<std::size_t>(count)) return;
+      const Groups own = ReadGroups(item, Place(at));
       Frame frame;
-      frame.segment = Integer(Group(item, shared, DCM_SegmentIdentificationSequence, at), DCM_ReferencedSegmentNumber,
-                              1, kMostLabel, Place(at));
+      frame.segment = OwnOrShared(own.segment, shared.segment, DCM_SegmentIdentificationSequence, at);
       if (segment_of_[static_cast<std::size_t>(frame.segment)] < 0) {
         Refuse(DCM_ReferencedSegmentNumber, Place(at), std::to_string(frame.segment), "a number of SegmentSequence");
       }
-      frame.corner =
-          Numbers<3>(Group(item, shared, DCM_PlanePositionSequence, at), DCM_ImagePositionPatient, Place(at));
-      const Plane plane = ReadPlane(item, shared, at);
-      if (at == 0) plane_ = plane;
-      CheckSamePlane(plane, at);
+      frame.corner = OwnOrShared(own.corner, shared.corner, DCM_PlanePositionSequence, at);
+      const Axes axes = OwnOrShared(own.axes, shared.axes, DCM_PlaneOrientationSequence, at);
+      const Spacing spacing = OwnOrShared(own.spacing, shared.spacing, DCM_PixelMeasuresSequence, at);
+      if (at == 0) {
+        axes_ = axes;
+        spacing_ = spacing;
+      }
+      CheckSamePlane(axes, spacing, at);
       frames_.push_back(frame);
     });
     if (items != static_cast<std::size_t>(count)) {
       Refuse(DCM_NumberOfFrames, "", std::to_string(count),
-             "that of the items of PerFrameFunctionalGroupsSequence, " + std::to_string(items) +
+             "that of the items of " + NameOf(DCM_PerFrameFunctionalGroupsSequence) + ", " + std::to_string(items) +
                  ". The file is damaged; export it again");
     }
   }
@@ -308,7 +283,7 @@ class Reader {
 
   /// Gives each frame its slice, and the map its size and place.
   void PlaceSlices() {
-    const Vec3d normal = plane_.row.cross(plane_.column).normalized();
+    const Vec3d normal = axes_.row.cross(axes_.column).normalized();
     for (Frame& frame : frames_) frame.along = frame.corner.dot(normal);
     std::vector<std::size_t> order(frames_.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
@@ -320,7 +295,7 @@ class Reader {
       Frame& frame = frames_[f];
       if (std::abs(frame.along - first - step * frame.slice) > kMostOff * step) RefuseSpacing(f, step);
       const Vec3d off = frame.corner - origin;
-      const double i = off.dot(plane_.row) / plane_.along_row, j = off.dot(plane_.column) / plane_.along_column;
+      const double i = off.dot(axes_.row) / spacing_.along_row, j = off.dot(axes_.column) / spacing_.along_column;
       if (std::max(std::abs(i), std::abs(j)) > kMostOff) {
         Refuse(Place(f) + " lies " + Number(i) + " columns and " + Number(j) +
                " rows beside the others: ImagePositionPatient (0020,0032) is off the normal. Valid: slices behind each "
@@ -338,7 +313,7 @@ class Reader {
     Mat3d W_from_lps;
     W_from_lps << 1, 0, 0, 0, 0, 1, 0, -1, 0;
     Mat3d axes;
-    axes << plane_.row * plane_.along_row, plane_.column * plane_.along_column, normal * step;
+    axes << axes_.row * spacing_.along_row, axes_.column * spacing_.along_column, normal * step;
     map_.W_from_index.linear() = W_from_lps * axes;
     map_.W_from_index.translation() = W_from_lps * origin;
   }
@@ -347,37 +322,47 @@ class Reader {
     Refuse(Place(frame) + ": ImagePositionPatient (0020,0032) is " + Number(frames_[frame].along) +
            " mm along the normal, between slices of " + Number(step) +
            " mm; valid: equal steps. Resample the segmentation to equal slices, as 3D Slicer does" +
-           (plane_.between_slices ? "" : ", or let it state SpacingBetweenSlices (0018,0088)"));
+           (spacing_.between_slices ? "" : ", or let it state SpacingBetweenSlices (0018,0088)"));
   }
 
   /// The distance of slices [mm], from frames in their order along the normal; sets their slices and the map's depth.
   double Step(const std::vector<std::size_t>& order) {
-    double step = plane_.between_slices.value_or(kLongest_mm);
-    for (std::size_t n = 1; n < order.size() && !plane_.between_slices; ++n) {
-      const double gap = frames_[order[n]].along - frames_[order[n - 1]].along;
-      if (gap > kSame_mm) step = std::min(step, gap);
+    const auto gap_before = [&](std::size_t n) { return frames_[order[n]].along - frames_[order[n - 1]].along; };
+    const std::string slices = std::to_string(kLeastVoxelsAlong) + " to " + std::to_string(kMostVoxelsAlong) +
+                               " slices. Give the segmentation of a volume";
+    std::optional<double> least_gap;
+    for (std::size_t n = 1; n < order.size(); ++n) {
+      const double gap = gap_before(n);
+      if (gap > kSame_mm && (!least_gap || gap < *least_gap)) least_gap = gap;
     }
+    if (!least_gap) {
+      Refuse("all its frames lie in one slice by ImagePositionPatient (0020,0032); valid: " + slices);
+    }
+    if (!spacing_.between_slices && *least_gap > kLongest_mm) {
+      Refuse("its slices are " + Number(*least_gap) +
+             " mm apart by ImagePositionPatient (0020,0032); valid: " + Number(kShortest_mm) + " to " +
+             Number(kLongest_mm) + " mm. Resample the segmentation to a finer volume, as 3D Slicer does");
+    }
+    const double step = spacing_.between_slices.value_or(*least_gap);
+    const double depth = frames_[order.back()].along - frames_[order.front()].along;
     double slice = 0;
     for (std::size_t n = 1; n < order.size(); ++n) {
-      const double gap = frames_[order[n]].along - frames_[order[n - 1]].along;
+      const double gap = gap_before(n);
       if (gap > kSame_mm) {
         const double steps = std::round(gap / step);
         if (steps < 1 || std::abs(gap - steps * step) > 2 * kMostOff * step) RefuseSpacing(order[n], step);
         slice += steps;
       }
-      if (slice >= kMostVoxelsAlong) break;
+      if (slice >= kMostVoxelsAlong) {
+        Refuse("its frames span " + Number(depth) +
+               " mm by ImagePositionPatient (0020,0032): " + Number(std::round(depth / step) + 1) + " slices of " +
+               Number(step) + " mm; valid: " + slices + ", cropped to its organs");
+      }
       frames_[order[n]].slice = static_cast<int>(slice);
-    }
-    if (slice + 1 < kLeastVoxelsAlong || slice + 1 > kMostVoxelsAlong) {
-      const double depth = frames_[order.back()].along - frames_[order.front()].along;
-      Refuse("its " + std::to_string(frames_.size()) + " frames span " + Number(depth) + " mm, in slices of " +
-             Number(step) + " mm " + Number(std::floor(depth / step) + 1) +
-             " of them; valid: " + std::to_string(kLeastVoxelsAlong) + " to " + std::to_string(kMostVoxelsAlong) +
-             ". Give the segmentation of a volume; crop it if it is longer");
     }
     map_.size[2] = static_cast<int>(slice) + 1;
     // Rounding of two positions does not add up over all.
-    return (frames_[order.back()].along - frames_[order.front()].along) / slice;
+    return depth / slice;
   }
 
   void FillVoxels(const std::set<int>& wanted) {
@@ -421,7 +406,6 @@ class Reader {
     }
   }
 
-  const fs::path path_;
   DcmFileFormat file_;
   DcmDataset* data_ = nullptr;
   DcmElement* pixels_ = nullptr;
@@ -429,7 +413,8 @@ class Reader {
   int half_ = 1;                 ///< Least value that is labelled.
   std::vector<int> segment_of_;  ///< Of each number its place in the map's list; -1: none.
   std::vector<Frame> frames_;
-  Plane plane_;
+  Axes axes_;
+  Spacing spacing_;
   LabelMap map_;
 };
 

@@ -88,7 +88,7 @@ std::string CoveredText(const LabelMap& map, int label) {
   const Segment* segment = SegmentOf(map, label);
   if (segment == nullptr || segment->covered == 0) return "";
   return PrintText(
-      ". %zu more also belong to a segment with a higher number, which counts: leave that one out of the map",
+      ". %zu more also belong to a segment with a higher number, which takes precedence: leave that one out of the map",
       segment->covered);
 }
 
@@ -111,7 +111,7 @@ std::string Page(const AnatomyImport& import, const LabelMap& map, const std::ve
     const Segment* segment = SegmentOf(map, r.use.label);
     if (segment != nullptr && segment->covered > 0) {
       overlaps += PrintText(" %zu voxels of ", segment->covered) + EscapeHtml(r.use.name) +
-                  " also belong to a segment with a higher number, which counts.";
+                  " also belong to a segment with a higher number, which takes precedence.";
     }
     page += "<tr><td>" + EscapeHtml(r.use.name) +
             (segment != nullptr && !segment->name.empty() ? " – " + EscapeHtml(segment->name) : "") +
@@ -164,8 +164,9 @@ std::map<std::string, TriangleMesh> SurfacesOfLabels(const AnatomyImport& import
   say(PrintText("%d x %d x %d voxels", map->size[0], map->size[1], map->size[2]));
   for (const Segment& s : map->segments) {
     if (s.covered > 0) {
-      say(PrintText("segment %d (%s): %zu of %zu voxels also belong to a segment with a higher number, which counts",
-                    s.number, s.name.c_str(), s.covered, s.voxels));
+      say(PrintText(
+          "segment %d (%s): %zu of %zu voxels also belong to a segment with a higher number, which takes precedence",
+          s.number, s.name.c_str(), s.covered, s.voxels));
     }
   }
   *counts = CountLabels(*map);
@@ -334,6 +335,12 @@ std::string SuggestLabelUses(const fs::path& labels) {
   } else {
     const LabelMap map = ReadLabelMap(labels);
     const double voxel_ml = 1e-3 * std::abs(map.W_from_index.linear().determinant());
+    if (map.segments.empty()) {
+      for (const auto& [label, count] : CountLabels(map)) {
+        const std::string number = std::to_string(label);
+        entries.push_back({"label: " + number, "label" + number, static_cast<double>(count) * voxel_ml, "ml"});
+      }
+    }
     for (const Segment& s : map.segments) {
       if (s.voxels == 0) continue;
       const std::string number = std::to_string(s.number), name = FileName(s.name);
@@ -342,11 +349,6 @@ std::string SuggestLabelUses(const fs::path& labels) {
       entries.push_back(
           {"label: " + number, has_name ? name : "label" + number, static_cast<double>(s.voxels) * voxel_ml,
            s.covered == 0 ? "ml" : PrintText("ml, of it %.6g in segments with higher numbers", covered_ml)});
-    }
-    for (const auto& [label, count] : CountLabels(map)) {
-      if (!map.segments.empty()) break;
-      const std::string number = std::to_string(label);
-      entries.push_back({"label: " + number, "label" + number, static_cast<double>(count) * voxel_ml, "ml"});
     }
   }
   if (entries.empty()) {

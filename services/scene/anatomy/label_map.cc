@@ -67,7 +67,8 @@ LabelMap ReadNifti(const std::filesystem::path& file) {
   for (const std::int64_t n : size) {
     if (n < kLeastVoxelsAlong || n > kMostVoxelsAlong) {
       Refuse(file, "is " + std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " + std::to_string(size[2]) +
-                       " voxels; valid: 2 to 4096 either way");
+                       " voxels; valid: " + std::to_string(kLeastVoxelsAlong) + " to " +
+                       std::to_string(kMostVoxelsAlong) + " either way");
     }
   }
   const auto voxels =

@@ -19,7 +19,7 @@ struct Segment {
   int number = 0;           ///< 1 to 65535, its label.
   std::string name;         ///< SegmentLabel, printable UTF-8.
   std::size_t voxels = 0;   ///< Of the segment itself.
-  std::size_t covered = 0;  ///< Of these: also of a segment with a higher number, which counts.
+  std::size_t covered = 0;  ///< Of these: also of a segment with a higher number, which takes precedence.
 };
 
 /// Label 0 is nothing. Voxel (i, j, k) has index i + nx (j + ny k) and its centre at W_from_index (i, j, k).

@@ -138,23 +138,22 @@ void AddSheets(const SceneSettings& settings, const Placement& placement, const 
 
 void AddFixed(const std::vector<FixedSettings>& surfaces, const SceneSettings& settings, const Placement& placement,
               const Progress& progress, Anatomy* anatomy) {
+  const ImportSettings like = settings.import.value_or(ImportSettings{});
   for (const FixedSettings& wanted : surfaces) {
-    ImportSettings like = settings.import.value_or(ImportSettings{});
-    TriangleMesh mesh = Named("fixed surface", wanted.name, [&] {
-      if (!wanted.file.empty()) return SurfaceOf(ReadMesh(wanted.file));
+    Named("fixed surface", wanted.name, [&] {
+      const bool is_shape = wanted.file.empty();
+      TriangleMesh mesh = is_shape ? SurfaceOfShape(wanted.shape) : SurfaceOf(ReadMesh(wanted.file));
       // Shapes are in metres already.
-      like.scale_m = 1;
-      return SurfaceOfShape(wanted.shape);
+      ToMetres(is_shape ? 1 : like.scale_m, like.origin_m, wanted.offset_m, &mesh.vertices);
+      for (Vec3d& p : mesh.vertices) p = placement.ToWorld(p);
+      mesh = Decimate(mesh, wanted.triangles_max);
+      if (wanted.inside) {
+        for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
+      }
+      Say(progress, "%s: %zu triangles", wanted.name.c_str(), mesh.triangles.size());
+      anatomy->surroundings.push_back(
+          {wanted.name, wanted.role, wanted.collides, std::move(mesh.vertices), std::move(mesh.triangles)});
     });
-    ToMetres(like, wanted.offset_m, &mesh.vertices);
-    for (Vec3d& p : mesh.vertices) p = placement.ToWorld(p);
-    mesh = Decimate(mesh, wanted.triangles_max);
-    if (wanted.inside) {
-      for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
-    }
-    Say(progress, "%s: %zu triangles", wanted.name.c_str(), mesh.triangles.size());
-    anatomy->surroundings.push_back(
-        {wanted.name, wanted.role, wanted.collides, std::move(mesh.vertices), std::move(mesh.triangles)});
   }
 }
 

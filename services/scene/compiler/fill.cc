@@ -117,9 +117,9 @@ FilledBody FillSurface(const TriangleMesh& read, const ImportSettings& import, c
 
 }  // namespace
 
-void ToMetres(const ImportSettings& import, const Vec3f& offset_m, std::vector<Vec3d>* points) {
+void ToMetres(double scale_m, const Vec3f& origin_m, const Vec3f& offset_m, std::vector<Vec3d>* points) {
   for (Vec3d& p : *points) {
-    p = import.scale_m * p - import.origin_m.cast<double>() + offset_m.cast<double>();
+    p = scale_m * p - origin_m.cast<double>() + offset_m.cast<double>();
   }
 }
 
@@ -130,7 +130,7 @@ FilledBody FillBody(const ImportSettings& import, const std::string& name, const
     return FillSurface(surface, import, name, progress);
   }
   MeshFile file = ReadMesh(import.organ_file);
-  ToMetres(import, Vec3f::Zero(), &file.vertices);
+  ToMetres(import.scale_m, import.origin_m, Vec3f::Zero(), &file.vertices);
   CheckSize(file, import, name);
   Say(progress, "%s: %zu vertices, %zu triangles, %zu tetrahedra, %zu points and lines left out", name.c_str(),
       file.vertices.size(), file.triangles.size(), file.tets.size(), file.skipped);

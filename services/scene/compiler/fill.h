@@ -18,7 +18,7 @@ struct FilledBody {
 /// InputError "name: reason".
 FilledBody FillBody(const ImportSettings& import, const std::string& name, const Progress& progress);
 
-/// From the files' unit and origin to metres.
-void ToMetres(const ImportSettings& import, const Vec3f& offset_m, std::vector<Vec3d>* points);
+/// From a file's unit and origin to metres.
+void ToMetres(double scale_m, const Vec3f& origin_m, const Vec3f& offset_m, std::vector<Vec3d>* points);
 
 }  // namespace fulcrum::scene

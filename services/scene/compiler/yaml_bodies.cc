@@ -92,6 +92,11 @@ BodySettings ReadBody(StrictMap map, const FindMesh& find, const MaterialLibrary
   return body;
 }
 
+/// Refuses a name that another body, sheet or fixed surface has.
+void TakeName(const StrictMap& entry, const std::string& name, std::set<std::string>* names) {
+  if (!names->insert(name).second) entry.Fail("name", "'" + name + "' is there twice");
+}
+
 enum class Held { kAll, kNone, kRows, kColumns };
 const StrictMap::Choices<Held> kHeld = {
     {"all", Held::kAll}, {"none", Held::kNone}, {"ends", Held::kRows}, {"sides", Held::kColumns}};
@@ -232,7 +237,7 @@ std::vector<StrictMap> ReadBodies(StrictMap* root, const FindMesh& find, const M
   if (scene->has_organ) names.insert("organ");
   for (StrictMap& entry : root->Maps("bodies", 0, kMostBodies)) {
     scene->bodies.push_back(ReadBody(entry, find, materials));
-    if (!names.insert(scene->bodies.back().name).second) entry.Fail("name", "is there twice");
+    TakeName(entry, scene->bodies.back().name, &names);
   }
   const std::set<std::string> bodies = names;
   const std::string organ = scene->has_organ ? ", nor `organ`" : "";
@@ -243,7 +248,7 @@ std::vector<StrictMap> ReadBodies(StrictMap* root, const FindMesh& find, const M
       entry.Fail("over", "'" + sheet.over + "' is no body of this scene");
     }
     if (sheet.name == "membrane") entry.Fail("name", "`membrane` is the name of the sheet over the organ");
-    if (!names.insert(sheet.name).second) entry.Fail("name", "is there twice");
+    TakeName(entry, sheet.name, &names);
   }
   for (StrictMap& entry : root->Maps("attach", 0, kMostAttachments)) {
     AttachSettings attach;
@@ -258,13 +263,19 @@ std::vector<StrictMap> ReadBodies(StrictMap* root, const FindMesh& find, const M
     ReadSi(&entry, "youngs_modulus_kPa", Range::Between(0.001, 1e4), &attach.youngs_modulus_Pa);
     scene->attach.push_back(attach);
   }
+  if (scene->import) {
+    for (const FixedSettings& surface : scene->import->surroundings) names.insert(surface.name);
+  }
   for (StrictMap& entry : root->Maps("fixed", 0, kMostSurroundings)) {
     FixedSettings& surface = scene->fixed.emplace_back(ReadFixedSurface(&entry));
     if (entry.Has("mesh") == entry.Has("shape")) entry.Fail("name", "needs either `mesh` or `shape`");
     if (entry.Has("mesh")) surface.file = find(entry, "mesh");
     if (auto shape = entry.OptionalMap("shape")) surface.shape = ReadShape(*shape);
     surface.inside = entry.Flag("inside", surface.inside);
-    if (!names.insert(surface.name).second) entry.Fail("name", "is there twice");
+    if (surface.name == "membrane" || surface.name == "cavity") {
+      entry.Fail("name", "'" + surface.name + "' is the name of another surface; choose another one");
+    }
+    TakeName(entry, surface.name, &names);
   }
   return sheets;
 }

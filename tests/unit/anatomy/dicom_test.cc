@@ -233,8 +233,9 @@ TEST_F(DicomSegmentation, WhatIsNoSegmentationOfAVolumeIsRefused) {
   const auto number = [](const DcmTagKey& key, Uint16 value) {
     return [key, value](DcmDataset* data) { EXPECT_TRUE(data->putAndInsertUint16(key, value).good()); };
   };
-  const auto shared = [](const DcmTagKey& group, const DcmTagKey& key, const char* value) {
-    return [=](DcmDataset* data) { EXPECT_TRUE(SharedGroup(data, group)->putAndInsertString(key, value).good()); };
+  const auto shared = [](const DcmTagKey& group, const DcmTagKey& key, const std::string& value) {
+    return
+        [=](DcmDataset* data) { EXPECT_TRUE(SharedGroup(data, group)->putAndInsertString(key, value.c_str()).good()); };
   };
   const struct {
     std::function<void(DcmDataset*)> change;
@@ -243,6 +244,9 @@ TEST_F(DicomSegmentation, WhatIsNoSegmentationOfAVolumeIsRefused) {
       {text(DCM_SOPClassUID, UID_CTImageStorage), "is '1.2.840.10008.5.1.4.1.1.2' (CTImageStorage)"},
       {text(DCM_SOPClassUID, "1.2.840.10008.5.1.4.1.1.66.7"), "(LabelMapSegmentationStorage)"},
       {number(DCM_InConcatenationTotalNumber, 3), "InConcatenationTotalNumber (0020,9163) is '3'; valid: 1: this is"},
+      {text(DCM_ConcatenationUID, "1.2.3"), "InConcatenationTotalNumber (0020,9163) is missing; valid: 1: this is"},
+      {number(DCM_InConcatenationNumber, 1), "InConcatenationTotalNumber (0020,9163) is missing; valid: 1: this is"},
+      {text(DCM_SegmentationType, "FRACTIONAL"), "BitsAllocated (0028,0100) is '1'; valid: 8"},
       {text(DCM_SegmentationType, "LABELMAP"), "SegmentationType (0062,0001) is 'LABELMAP'; valid: BINARY or"},
       {number(DCM_BitsAllocated, 16), "BitsAllocated (0028,0100) is '16'; valid: 1"},
       {number(DCM_HighBit, 7), "HighBit (0028,0102) is '7'; valid: 0"},
@@ -254,18 +258,27 @@ TEST_F(DicomSegmentation, WhatIsNoSegmentationOfAVolumeIsRefused) {
       {[](DcmDataset* d) { delete d->remove(DCM_PixelData); }, "PixelData (7fe0,0010) has 0 bytes"},
       {[](DcmDataset* d) { delete d->remove(DCM_Rows); }, "Rows (0028,0010) is missing"},
       {[](DcmDataset* d) { delete d->remove(DCM_SegmentSequence); }, "SegmentSequence (0062,0002) is missing"},
-      {[](DcmDataset* d) { delete d->remove(DCM_PerFrameFunctionalGroupsSequence); }, "NumberOfFrames"},
+      {[](DcmDataset* d) { delete d->remove(DCM_PerFrameFunctionalGroupsSequence); },
+       "that of the items of PerFrameFunctionalGroupsSequence (5200,9230), 0. The"},
       {[](DcmDataset* d) { delete d->remove(DCM_SharedFunctionalGroupsSequence); },
        "frame 1 has no PlaneOrientationSequence (0020,9116)"},
       {shared(DCM_PixelMeasuresSequence, DCM_PixelSpacing, "0\\1"), "PixelSpacing (0028,0030) is 0 mm; valid: 0.01"},
       {shared(DCM_PixelMeasuresSequence, DCM_PixelSpacing, "1"), "PixelSpacing (0028,0030) is '1'; valid: 2 numbers"},
       {shared(DCM_PixelMeasuresSequence, DCM_PixelSpacing, "1\\nan"), "PixelSpacing (0028,0030) is '1\\nan'"},
+      {shared(DCM_PixelMeasuresSequence, DCM_PixelSpacing, std::string(200, '0') + "1\\1.25"),
+       "of at most 64 characters each"},
       {shared(DCM_PixelMeasuresSequence, DCM_SpacingBetweenSlices, "4"), "valid: equal steps"},
       {shared(DCM_PlaneOrientationSequence, DCM_ImageOrientationPatient, "1\\0\\0\\0.1\\1\\0"), "at a right angle"},
       {shared(DCM_PlaneOrientationSequence, DCM_ImageOrientationPatient, "1\\0\\0\\0\\0\\0"), "of length 1"},
       {[](DcmDataset* d) { Move(d, 1, 1, 0.4); }, "frame 2: ImagePositionPatient (0020,0032) is "},
       {[](DcmDataset* d) { Move(d, 1, 0, 1.0); }, "beside the others"},
-      {[](DcmDataset* d) { Move(d, 0, 1, 900000); }, "valid: "},
+      {[](DcmDataset* d) { Move(d, 0, 1, 9600); },  // 6400 slices, and up to 28 more or less.
+       " mm by ImagePositionPatient (0020,0032): 6"},
+      {[](DcmDataset* d) {
+         delete SharedGroup(d, DCM_PixelMeasuresSequence)->remove(DCM_SpacingBetweenSlices);
+         Move(d, 1, 1, 0.4);
+       },
+       "equal slices, as 3D Slicer does, or let it state SpacingBetweenSlices (0018,0088)"},
       {[](DcmDataset* d) { Move(d, 0, 1, 9e8); }, "3 numbers up to 1e6"},
       {[](DcmDataset* d) {
          (void)Group(d, 1, DCM_SegmentIdentificationSequence)->putAndInsertUint16(DCM_ReferencedSegmentNumber, 9);
@@ -285,6 +298,50 @@ TEST_F(DicomSegmentation, WhatIsNoSegmentationOfAVolumeIsRefused) {
     EXPECT_EQ(refusal.find((folder_ / "y.dcm").string() + ": "), 0u) << refusal;
     EXPECT_EQ(refusal.find('\n'), std::string::npos) << refusal;
   }
+}
+
+TEST_F(DicomSegmentation, ThePlacesOfSlicesAreChecked) {
+  DicomSegments segments;
+  DicomOptions options;
+  options.states_spacing = false;
+  const auto refusal = [&](int slices, double spacing_mm) {
+    segments.size = {8, 8, slices};
+    segments.lps_from_index.linear() = Vec3d(1, 1, spacing_mm).asDiagonal();
+    segments.segments = {{"All", std::vector<std::uint8_t>(static_cast<std::size_t>(64 * slices), 1)}};
+    return Refusal([&] { (void)ReadLabelMap(WriteDicom(segments, options)); });
+  };
+  EXPECT_EQ(refusal(3, 100), "");
+  const std::string wide = refusal(3, 150), single = refusal(1, 2);
+  EXPECT_NE(wide.find("are 150 mm apart by ImagePositionPatient (0020,0032); valid: 0.01 to 100 mm"), std::string::npos)
+      << wide;
+  EXPECT_NE(single.find("all its frames lie in one slice by ImagePositionPatient (0020,0032); valid: 2 to 4096 slices"),
+            std::string::npos)
+      << single;
+}
+
+TEST_F(DicomSegmentation, AValueMayBeginAsAnItemDoes) {
+  // Without types (VR) bytes do not tell a value from a sequence.
+  const std::string item("\xfe\xff\x00\xe0\xf0\xff\xff\x7f", 8), text = "What is derived";
+  EXPECT_EQ(
+      RefusalOf(
+          [&](DcmDataset* d) { EXPECT_TRUE(d->putAndInsertString(DCM_DerivationDescription, text.c_str()).good()); },
+          EXS_LittleEndianImplicit),
+      "");
+  std::ifstream in(folder_ / "y.dcm", std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  const std::size_t text_at = bytes.find(text), pixels_at = bytes.find(std::string("\xe0\x7f\x10\x00", 4));
+  ASSERT_NE(text_at, std::string::npos);
+  ASSERT_NE(pixels_at, std::string::npos);
+  bytes.replace(text_at, item.size(), item);
+  bytes.replace(pixels_at + 8, item.size(), item);
+  EXPECT_EQ(Refusal([&] { (void)ReadLabelMap(Write("z.dcm", bytes)); }), "");
+  // A sequence must hold items.
+  const std::size_t segments_at = bytes.find(std::string("\x62\x00\x02\x00", 4));
+  ASSERT_NE(segments_at, std::string::npos);
+  bytes.replace(segments_at + 4, 4, "\x20\x00\x00\x00", 4);
+  bytes.replace(segments_at + 8, item.size(), item);
+  const std::string refusal = Refusal([&] { (void)ReadLabelMap(Write("z.dcm", bytes)); });
+  EXPECT_NE(refusal.find("valid: an item (fffe,e000) within its sequence"), std::string::npos) << refusal;
 }
 
 TEST_F(DicomSegmentation, CutOrEndlessFilesAreRefused) {

@@ -202,7 +202,11 @@ TEST(Bodies, BadFixedSurfacesAreRefused) {
   const auto of = [](const std::string& entry) { return RefusalOf("fixed: [" + entry + "]\n"); };
   EXPECT_NE(of("{name: a}").find("needs either `mesh` or `shape`"), std::string::npos) << of("{name: a}");
   const std::string twice = "{name: a, shape: {ellipsoid_mm: [9, 9, 9]}}";
-  EXPECT_NE(of(twice + ", " + twice).find("is there twice"), std::string::npos);
+  EXPECT_NE(of(twice + ", " + twice).find("'a' is there twice"), std::string::npos);
+  for (const char* name : {"membrane", "cavity"}) {
+    const std::string refusal = of("{name: " + std::string(name) + ", shape: {ellipsoid_mm: [9, 9, 9]}}");
+    EXPECT_NE(refusal.find("'" + std::string(name) + "' is the name of another surface"), std::string::npos) << refusal;
+  }
   EXPECT_NE(of("{name: a, role: spleen, shape: {ellipsoid_mm: [9, 9, 9]}}").find("role"), std::string::npos);
   EXPECT_NE(of("{name: a, mesh: nowhere.stl}").find("nowhere.stl"), std::string::npos);
 }
@@ -213,7 +217,7 @@ TEST(Bodies, BadOnesAreRefused) {
        "artery, bile_duct"},
       {"bodies: [{name: a, material: liver}]\n", "needs one of"},
       {"bodies: [{name: a, material: liver, mesh: nowhere.stl}]\n", "nowhere.stl"},
-      {"bodies: [{name: organ, material: liver, shape: {ellipsoid_mm: [9, 9, 9]}}]\n", "is there twice"},
+      {"bodies: [{name: organ, material: liver, shape: {ellipsoid_mm: [9, 9, 9]}}]\n", "'organ' is there twice"},
       {"bodies: [{name: a, material: liver, tube: {x_mm: [0, 1], y_mm: [0, 0], z_mm: [0, 1, 2], radius_mm: [1]}}]\n",
        "as many entries"},
       {"bodies: [{name: a, material: liver, tube: {x_mm: [0, 0], y_mm: [0, 0], z_mm: [0, 0], radius_mm: [1]}}]\n",

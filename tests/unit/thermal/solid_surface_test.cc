@@ -5,6 +5,9 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <utility>
 #include <vector>
 
 namespace fulcrum::thermal {
@@ -192,6 +195,29 @@ TEST_F(SolidSurfaceTest, ContinuesFromACheckpointBitForBit) {
   EXPECT_LT(untouched.size(), 400u);
   SolidSurface fresh(scene_);
   EXPECT_TRUE(fresh.Restore(untouched));
+  // The last word but one says which solids were warned of: none may be beyond the last one.
+  const std::size_t warned_at = untouched.size() - 2 * sizeof(std::uint32_t);
+  for (const auto& [solid, is_valid] : {std::pair{kMaxSolids - 1, true}, {kMaxSolids, false}, {Index{31}, false}}) {
+    const std::uint32_t warned = 1u << solid;
+    std::memcpy(&untouched[warned_at], &warned, sizeof(warned));
+    EXPECT_EQ(fresh.Restore(untouched), is_valid) << solid;
+  }
+}
+
+TEST_F(SolidSurfaceTest, OnlyOfWhatWasHeatedIsWarned) {
+  // Warm from the start.
+  scene_.thermal.body_temperature_C = 46;
+  SolidSurface solids(scene_);
+  const TipInput tip = At({0.012f, 0.01f, 0}, CauteryMode::kCoag, 30);
+  std::vector<SolidWarning> warnings;
+  for (int frame = 0; frame < 30; ++frame) {
+    solids.Step(std::span(&tip, 1), kDt, &hook_);
+    warnings.insert(warnings.end(), solids.warnings().begin(), solids.warnings().end());
+  }
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].solid, 0u);
+  EXPECT_TRUE(solids.warned(0));
+  EXPECT_FALSE(solids.warned(1));
 }
 
 TEST_F(SolidSurfaceTest, BadValuesDoNotSpread) {
