@@ -29,7 +29,7 @@ float DistanceToSegment(const Vec2f& p, const Vec2f& a, const Vec2f& b) {
 
 constexpr int kFilmCell = 2;  // Texels in a cell of the film, in each direction.
 
-void Raise(float value, std::uint8_t* byte) { *byte = std::max(*byte, static_cast<std::uint8_t>(value + 0.5f)); }
+void Raise(float value, std::uint8_t* byte) { *byte = std::max(*byte, static_cast<std::uint8_t>(std::lround(value))); }
 
 /// 1 at `from`, 0 at `to`, linear between.
 float Ramp(float value, float from, float to) { return std::clamp((to - value) / (to - from), 0.0f, 1.0f); }

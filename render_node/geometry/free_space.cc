@@ -162,8 +162,8 @@ void GridField::LowerAll(std::span<const Eigen::Vector4f> points) {
 
 Vec3f GridField::NodeAt(std::size_t node) const {
   const auto n = static_cast<std::size_t>(count_);
-  return low_ + spacing_ * Vec3f(static_cast<float>(node % n), static_cast<float>(node / n % n),
-                                 static_cast<float>(node / n / n));
+  const std::size_t x = node % n, y = node / n % n, z = node / n / n;
+  return low_ + spacing_ * Vec3f(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
 }
 
 std::size_t GridField::NearestNode(const Vec3f& p) const {

@@ -87,8 +87,9 @@ void AddCells(int size, int cells, float amplitude, Uniform* uniform, std::vecto
   const auto count = static_cast<std::size_t>(cells);
   std::vector<Centre> centres;
   for (std::size_t k = 0; k < count * count; ++k) {
-    const float u = static_cast<float>(k % count) + 0.1f + 0.8f * (*uniform)();
-    const float v = static_cast<float>(k / count) + 0.1f + 0.8f * (*uniform)();
+    const std::size_t column = k % count, row = k / count;
+    const float u = static_cast<float>(column) + 0.1f + 0.8f * (*uniform)();
+    const float v = static_cast<float>(row) + 0.1f + 0.8f * (*uniform)();
     centres.push_back({u, v, (*uniform)()});
   }
   for (int y = 0; y < size; ++y) {

@@ -138,8 +138,7 @@ class Outline {
   /// A UID has at most 64 characters, padded by a zero.
   std::string Text(std::uint32_t length) {
     const std::string text(Peek(std::min<std::uint32_t>(length, 64)), std::min<std::uint32_t>(length, 64));
-    const std::string plain = text.substr(0, text.find_first_not_of("0123456789."));
-    return plain;
+    return text.substr(0, text.find_first_not_of("0123456789."));
   }
   void Skip(std::uint32_t bytes) {
     if (bytes > size_ - at_) Peek(static_cast<std::size_t>(size_ - at_) + 1);

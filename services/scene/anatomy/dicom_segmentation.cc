@@ -185,7 +185,7 @@ class Reader : private DicomElements {
 
   Axes ReadAxes(DcmItem* group, const std::string& where) const {
     const auto numbers = Numbers<6>(group, DCM_ImageOrientationPatient, where);
-    const Axes axes{numbers.head<3>(), numbers.tail<3>()};
+    Axes axes{numbers.head<3>(), numbers.tail<3>()};
     if (std::abs(axes.row.norm() - 1) > 1e-3 || std::abs(axes.column.norm() - 1) > 1e-3 ||
         std::abs(axes.row.dot(axes.column)) > 1e-3) {
       Refuse(DCM_ImageOrientationPatient, where, Text(group, DCM_ImageOrientationPatient),

@@ -364,6 +364,7 @@ int main(int argc, char** argv) {
     const scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());
     const SceneView view = data.View();
     for (const StereoLayout layout : {StereoLayout::kNone, StereoLayout::kSideBySide}) {
+      render::FullScene(view, layout, 960, 540, &report);
       render::FullScene(view, layout, 1280, 720, &report);
       render::FullScene(view, layout, 1920, 1080, &report);
     }
