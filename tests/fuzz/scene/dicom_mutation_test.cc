@@ -1,35 +1,11 @@
 // Thousands of mutations of small DICOM segmentations, equal in every run: each is read or refused, within the memory
-// that its bytes justify.
+// that its grid and its bytes justify.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
-#include <new>
 #include <random>
 
 #include "tests/fuzz/scene/dicom_samples.h"
-
-namespace {
-
-std::atomic<std::size_t> g_largest_allocation{0};
-
-void* Allocate(std::size_t size) {
-  std::size_t largest = g_largest_allocation.load(std::memory_order_relaxed);
-  while (size > largest && !g_largest_allocation.compare_exchange_weak(largest, size, std::memory_order_relaxed)) {
-  }
-  void* memory = std::malloc(size > 0 ? size : 1);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-
-}  // namespace
-
-void* operator new(std::size_t size) { return Allocate(size); }
-void* operator new[](std::size_t size) { return Allocate(size); }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete[](void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+#include "tests/fuzz/scene/largest_allocation.h"
 
 namespace fulcrum::fuzz {
 namespace {
