@@ -23,6 +23,14 @@ class MembraneMeshTest : public testing::Test {
   Index Node(std::uint32_t row, std::uint32_t col) const { return row * view_.membrane.cols + col; }
 
   /// Cuts all edges between column `col` and `col + 1` from row `first` to row `last`: a straight slit along t.
+  /// Removes the nodes of rows 24 to 34 in columns 6 to 12.
+  void RemovePatch() {
+    for (std::uint32_t row = 24; row <= 34; ++row) {
+      for (std::uint32_t col = 6; col <= 12; ++col) SetBit(topology_.dead_nodes, Node(row, col));
+    }
+    ASSERT_TRUE(mesh_.SetTopology(topology_));
+  }
+
   void CutBetweenColumns(std::uint32_t col, std::uint32_t first, std::uint32_t last) {
     for (std::uint32_t row = first; row <= last; ++row) {
       SetBit(topology_.dead_edges, 3 * std::size_t{Node(row, col)} + 0);
@@ -214,10 +222,7 @@ TEST_F(MembraneMeshTest, BaredFatStaysOnTheTubeWhileTheSlitOpens) {
 
 TEST_F(MembraneMeshTest, FatIsBaredWhereTheSheetIsRemoved) {
   FatLayer fat(view_, 2);
-  for (std::uint32_t row = 24; row <= 34; ++row) {
-    for (std::uint32_t col = 6; col <= 12; ++col) SetBit(topology_.dead_nodes, Node(row, col));
-  }
-  ASSERT_TRUE(mesh_.SetTopology(topology_));
+  ASSERT_NO_FATAL_FAILURE(RemovePatch());
   mesh_.Update(Interleaved(view_.rest_position));
   fat.FindCuts(mesh_);
   fat.Update(Interleaved(view_.rest_position), mesh_, eye_);
@@ -238,10 +243,7 @@ TEST_F(MembraneMeshTest, FatIsBaredWhereTheSheetIsRemoved) {
 
 TEST_F(MembraneMeshTest, FatIsBaredWhereTheEyeSeesItThroughALiftedOpening) {
   FatLayer fat(view_, 2);
-  for (std::uint32_t row = 24; row <= 34; ++row) {
-    for (std::uint32_t col = 6; col <= 12; ++col) SetBit(topology_.dead_nodes, Node(row, col));
-  }
-  ASSERT_TRUE(mesh_.SetTopology(topology_));
+  ASSERT_NO_FATAL_FAILURE(RemovePatch());
   constexpr float kLift_m = 0.010f;
   std::vector<Vec3f> particles(view_.rest_position.begin(), view_.rest_position.end());
   for (Index node = 0; node < view_.membrane.node_count(); ++node)
