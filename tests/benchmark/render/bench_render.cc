@@ -41,6 +41,24 @@ void Show(const SyntheticMoment& moment, LaparoscopeView* view) {
 
 namespace {
 
+SceneView Enlarged(SceneView view, int size) {
+  view.render.width *= static_cast<std::uint32_t>(size);
+  view.render.height *= static_cast<std::uint32_t>(size);
+  return view;
+}
+
+}  // namespace
+
+SampledView::SampledView(const SceneView& scene, const SyntheticMoment& moment, int size, float scale)
+    : view(Enlarged(scene, size)), laparoscope(view) {
+  laparoscope.SetMostScale(std::max(1.0f, scale));
+  laparoscope.SetScale(scale);
+  display = MakeOffscreenDisplay(laparoscope, view.render);
+  Show(moment, &laparoscope);
+}
+
+namespace {
+
 double CpuMs(clockid_t clock) {
   timespec now;
   clock_gettime(clock, &now);
@@ -187,17 +205,10 @@ void Edges(const SceneView& scene, benchmark::Report* report) {
   constexpr int kSamples = 4;
   const SyntheticMoment moment = MakeSyntheticMoment(scene, 12.0);
   const auto draw = [&](int size, float scale) {
-    SceneView view = scene;
-    view.render.width *= static_cast<std::uint32_t>(size);
-    view.render.height *= static_cast<std::uint32_t>(size);
-    LaparoscopeView laparoscope(view);
-    laparoscope.SetMostScale(std::max(1.0f, scale));
-    laparoscope.SetScale(scale);
-    const auto display = MakeOffscreenDisplay(laparoscope, view.render);
-    Show(moment, &laparoscope);
-    laparoscope.Update();
+    SampledView sampled(scene, moment, size, scale);
+    sampled.laparoscope.Update();
     Bitmap picture;
-    display->DrawAndRead(&picture);
+    sampled.display->DrawAndRead(&picture);
     return picture;
   };
   const Bitmap reference = Mean(draw(kSamples, 1), kSamples);

@@ -53,14 +53,7 @@ Bitmap MeanOf(const Sums& sums, int width, int height) {
 template <class Take>
 void DrawCreeping(const SceneView& scene, const SyntheticMoment& moment, int count, int size, float scale,
                   const Take& take) {
-  SceneView view = scene;
-  view.render.width *= static_cast<std::uint32_t>(size);
-  view.render.height *= static_cast<std::uint32_t>(size);
-  LaparoscopeView laparoscope(view);
-  laparoscope.SetMostScale(std::max(1.0f, scale));
-  laparoscope.SetScale(scale);
-  const auto display = MakeOffscreenDisplay(laparoscope, view.render);
-  Show(moment, &laparoscope);
+  SampledView sampled(scene, moment, size, scale);
   const RenderParams& start = scene.render;
   const Mat3f axes = MakeLaparoscope(start).view.block<3, 3>(0, 0);  // Rows: the picture's axes in frame W.
   const float distance = (start.scope_target_W - start.scope_tip_W).norm();
@@ -70,10 +63,10 @@ void DrawCreeping(const SceneView& scene, const SyntheticMoment& moment, int cou
     RenderParams camera = start;
     camera.scope_tip_W += static_cast<float>(k) * step;
     camera.scope_target_W += static_cast<float>(k) * step;
-    laparoscope.SetCamera(camera);
-    laparoscope.Update();
+    sampled.laparoscope.SetCamera(camera);
+    sampled.laparoscope.Update();
     Bitmap picture;
-    display->DrawAndRead(&picture);
+    sampled.display->DrawAndRead(&picture);
     take(k, picture);
   }
 }

@@ -1,8 +1,10 @@
 // Parts of bench_render, each with its own keys.
 #pragma once
 
+#include <memory>
 #include <utility>
 
+#include "render_node/scene_graph/display.h"
 #include "render_node/scene_graph/laparoscope_view.h"
 #include "tests/benchmark/report.h"
 #include "tests/integration/render/synthetic_scene.h"
@@ -11,6 +13,14 @@ namespace fulcrum::render {
 
 /// Gives the view all of a moment but its handles.
 void Show(const SyntheticMoment& moment, LaparoscopeView* view);
+
+/// A view of a moment, off screen: a picture with `size` times the scene's width and height, drawn at `scale`.
+struct SampledView {
+  SampledView(const SceneView& scene, const SyntheticMoment& moment, int size, float scale);
+  SceneView view;
+  LaparoscopeView laparoscope;
+  std::unique_ptr<Display> display;
+};
 
 /// The qualities whose pictures are compared with many samples a pixel, by scale.
 constexpr std::pair<const char*, float> kSampledScales[] = {
