@@ -97,8 +97,9 @@ struct OperatorInput {
 
 // ------------------------------------------------------------------------------------------------ ToolState
 
-/// The jaw of a scope is the zoom ring of its camera head: 0 wide (services/base/core/scope.h).
-enum class ToolKind : std::uint8_t { kNone, kGrasper, kHook, kScissors, kScope };
+/// The jaw of a scope is the zoom ring of its camera head: 0 wide (services/base/core/scope.h). That of a suction and
+/// irrigation tube is its trumpet valve (services/base/core/suction.h).
+enum class ToolKind : std::uint8_t { kNone, kGrasper, kHook, kScissors, kScope, kSuction };
 /// A scope is held clear of the tissue: nothing collides with it.
 constexpr bool TouchesTissue(ToolKind kind) { return kind != ToolKind::kNone && kind != ToolKind::kScope; }
 

@@ -186,13 +186,16 @@ struct Solid {
   Index first_surface_triangle, surface_triangle_count;
 };
 
-/// The tissue that joins two solids: a spring from a vertex of one to a point of a surface triangle of another, of the
-/// same stiffness in every direction, without force in the rest shape.
+/// The tissue that joins two solids: a spring from a vertex of one to a point of a surface triangle of another, without
+/// force in the rest shape.
 struct Attachment {
   Index vertex;
   Triangle surface;
   std::array<float, 3> barycentric;
   float stiffness_N_per_m;
+  /// Zero: glued, the same stiffness in every direction. Else the unit normal in W of the plane in which the two slide:
+  /// the spring acts along it only.
+  Vec3f normal = Vec3f::Zero();
 };
 
 /// A vertex of the high-resolution rectum surface, carried by one tetrahedron of the tube.
@@ -220,6 +223,8 @@ struct SheetPart {
   Index over;  ///< Number of the solid that it covers; kNoIndex: spanned freely, with air on both sides.
   /// Of its own [N/m], [N m], [Pa], stretch; 0: the value of PhysicsParams.
   float Et_N_per_m = 0, bending_Nm = 0, fat_youngs_modulus_Pa = 0, tear_stretch = 0;
+  /// Of its own [m], [W/mK], [S/m]; 0: the value of ThermalParams.
+  float thickness_m = 0, conductivity_W_mK = 0, sigma_S_m = 0;
 };
 
 enum class SurfaceRole : std::uint32_t { kAbdominalWall, kRetroperitoneum, kPelvis, kBladder, kOther };

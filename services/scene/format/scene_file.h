@@ -11,7 +11,7 @@
 
 namespace fulcrum::scene {
 
-inline constexpr std::uint32_t kSceneFileVersion = 15;
+inline constexpr std::uint32_t kSceneFileVersion = 16;
 /// Version of what the content hash is taken of; another one changes the hash of every scene.
 inline constexpr std::uint32_t kSceneContentVersion = 12;
 

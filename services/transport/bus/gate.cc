@@ -46,7 +46,7 @@ bool AllWithin(std::span<const float> values, float limit) {
 }
 
 bool IsTool(const ToolSample& t) {
-  return UpTo(t.kind, ToolKind::kScope) && UpTo(t.state, ServoState::kRise) && Magnitude(t.p_WT, kMaxCoordinate_m) &&
+  return UpTo(t.kind, ToolKind::kSuction) && UpTo(t.state, ServoState::kRise) && Magnitude(t.p_WT, kMaxCoordinate_m) &&
          IsUnit(t.q_WT) && Magnitude(t.v_WT, kMaxSpeed_m_s) && Magnitude(t.w_WT, kMaxTurnRate_rad_s) &&
          Magnitude(t.f_W, kMaxForce_N) && Within(t.model_age_s, 0.0, 1e9);
 }
