@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <string>
 
+#include "physics_node/node/contact_pace.h"
 #include "physics_node/node/physics_checkpoint.h"
 #include "services/base/core/contact_force.h"
 
@@ -253,6 +254,7 @@ void PhysicsNode::PublishContacts(const Tick& tick) {
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
     model.devices[i] = simulation_.Contacts(i);
     NoteForce(i, TissueForce(model.devices[i]).norm());
+    ToRealTime(pace_.value(), &model.devices[i]);
   }
   // The servo dates the model by the tool sample, so there is no model without one.
   if (used_.tool_before.sequence == 0 || !ports_.contacts.has_readers()) {
