@@ -1,6 +1,6 @@
 // The whole cart at work, as a user runs it: five nodes and the recorder over DDS on this machine, the built-in scene
 // with its script of traction and cutting. Then the same ticks again, each node alone and without other processes: what
-// the session adds to a step.
+// the session adds to a step. The start, as one waits for it; the window, as one looks at it; and the cart at rest.
 #include <unistd.h>
 
 #include <algorithm>
@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <initializer_list>
@@ -28,6 +29,7 @@
 #include "tests/support/cart.h"
 #include "tests/support/mouse_operator.h"
 #include "tests/support/session_bus.h"
+#include "tests/support/virtual_screen.h"
 
 namespace fulcrum {
 namespace {
@@ -186,6 +188,66 @@ bool Live(Report* report) {
   return true;
 }
 
+/// From the command to the first picture on the disk, of a scene that was compiled before.
+bool Start(Report* report) {
+  std::vector<double> times_s;
+  const int starts = report->quick() ? 2 : 7;
+  for (int i = 0; i <= starts; ++i) {
+    const auto begin = std::chrono::steady_clock::now();
+    const testing::Cart cart("built-in", kDomain);
+    while (cart.PictureTime() < 0) {
+      const std::chrono::duration<double> waited = std::chrono::steady_clock::now() - begin;
+      if (waited.count() > kPatience_s) return false;
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    const std::chrono::duration<double> used = std::chrono::steady_clock::now() - begin;
+    if (i > 0)
+      times_s.push_back(used.count());  // The first one may compile the scene, and reads programs from the disk.
+  }
+  report->Add("cart.start_to_picture_s", benchmark::Quantile(times_s, 0.5), "s");
+  report->Add("cart.start_to_picture_s_max", benchmark::Quantile(times_s, 1), "s");
+  return true;
+}
+
+/// The operation in a window of the scene's size, 960 x 540, recorded.
+bool Window(Report* report) {
+  const testing::VirtualScreen screen;
+  if (screen.display().empty()) {
+    std::fprintf(stderr, "bench_cart: Xvfb is needed; apt install xvfb\n");
+    return true;
+  }
+  ::setenv("DISPLAY", screen.display().c_str(), 1);
+  const int seconds = report->quick() ? 12 : 20;
+  // The scene asks for 15 pictures a second; here nothing but the machine limits them.
+  testing::Cart cart("built-in", kDomain,
+                     {"--window", "--record", "--seconds", std::to_string(seconds), "--set", "render.rate_Hz=60"});
+  // The pull and the cut.
+  if (!testing::WaitFor(kPatience_s, [&] { return cart.PictureTime() > 4; })) return false;
+  std::vector<double> rates_Hz;
+  {
+    testing::Eyes eyes(kDomain);
+    const auto drawn = [&eyes] {
+      eyes.Look();
+      return eyes.Metric(NodeId::kRender, "frames_drawn");
+    };
+    double before = std::numeric_limits<double>::quiet_NaN();
+    if (!testing::WaitFor(kPatience_s, [&] { return std::isfinite(before = drawn()); })) return false;
+    for (int second = 0; second < (report->quick() ? 5 : 12); ++second) {
+      std::this_thread::sleep_for(std::chrono::seconds(1));
+      const double after = drawn();
+      rates_Hz.push_back(after - before);
+      before = after;
+    }
+  }
+  report->Add("cart.window_fps_p50", benchmark::Quantile(rates_Hz, 0.5), "1/s");
+  if (!cart.WaitForEnd(kPatience_s)) return false;
+  const std::string summary = testing::ReadFile(cart.session() / "summary.json");
+  report->Add("cart.window_servo_overruns_per_minute",
+              60 * testing::FigureOf(summary, "haptics_node.overruns") / testing::FigureOf(summary, "session_seconds"),
+              "1");
+  return true;
+}
+
 /// Nothing touches the tissue: what the cart takes from the machine while it waits.
 bool Idle(Report* report) {
   const fs::path yaml = fs::temp_directory_path() / ("bench_cart_idle." + std::to_string(::getpid()) + ".yaml");
@@ -220,6 +282,12 @@ int main(int argc, char** argv) {
   const bool work = wants({"cart.cpu_pct", "cart.physics", "cart.thermal", "cart.haptics", "cart.render",
                            "cart.pictures_per_s", "cart.recording_MB_per_s"});
   const bool live = wants({"cart.live_pictures_per_s", "cart.motion_to_force_ms", "cart.motion_to_picture_ms"});
+  const bool start = wants({"cart.start_to_picture_s"});
+  const bool window = wants({"cart.window_"});
+  if ((start && !fulcrum::Start(&report)) || (window && !fulcrum::Window(&report))) {
+    std::fprintf(stderr, "bench_cart: the session did not begin or end\n");
+    return 1;
+  }
   if ((idle && !fulcrum::Idle(&report)) || (work && !fulcrum::Work(&report)) || (live && !fulcrum::Live(&report))) {
     std::fprintf(stderr, "bench_cart: the session did not begin or end\n");
     return 1;
