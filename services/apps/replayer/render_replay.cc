@@ -5,6 +5,7 @@
 #include <string>
 #include <tuple>
 
+#include "services/apps/replayer/recorded_topic.h"
 #include "services/apps/replayer/session_facts.h"
 #include "services/records/recording/time_order.h"
 #include "services/transport/bus/convert/cdr.h"
@@ -19,13 +20,15 @@ template <class T>
 class Feed {
  public:
   [[nodiscard]] bus::Input<T>& input() { return *in_; }
-  [[nodiscard]] const T& newest() const { return message_; }
+  [[nodiscard]] const T& newest() const { return newest_; }
   /// True when the message is of this topic; its stamp goes to `stamp_ns`.
-  bool Take(const std::string& topic, std::span<const std::uint8_t> bytes, std::int64_t* stamp_ns) {
+  bool Take(const std::string& topic, std::span<const std::uint8_t> bytes, std::int64_t latest_ns,
+            std::int64_t* stamp_ns) {
     if (topic != bus::RoleOf<T>().name) return false;
-    if (bus::DecodeCdr(bytes, &message_)) {
-      out_->Write(message_);
-      *stamp_ns = std::max(*stamp_ns, bus::StampOf(message_).stamp_ns);
+    if (const T* sample = recorded_.Take(bytes, latest_ns)) {
+      newest_ = *sample;
+      out_->Write(newest_);
+      *stamp_ns = std::max(*stamp_ns, bus::StampOf(newest_).stamp_ns);
     }
     return true;
   }
@@ -34,7 +37,8 @@ class Feed {
   bus::InProcessTopic<T> topic_;
   std::unique_ptr<bus::Input<T>> in_ = topic_.MakeInput();
   std::unique_ptr<typename bus::OutputOf<T>::type> out_ = topic_.MakeOutput();
-  T message_;
+  RecordedTopic<T> recorded_;
+  T newest_;
 };
 
 using Feeds =
@@ -58,7 +62,7 @@ render::RenderPorts PortsOf(Feeds& feeds) {
 
 struct RenderReplay::Impl {
   Impl(const std::filesystem::path& file, const SceneView& given, const render::RenderSettings& settings)
-      : recording(file), scene(given), messages(file), node(given, settings, PortsOf(feeds)) {}
+      : recording(file), scene(given), clock(ClockOf(file)), messages(file), node(given, settings, PortsOf(feeds)) {}
 
   [[nodiscard]] double TimeOf(std::int64_t stamp_ns) const {
     return 1e-9 * static_cast<double>(stamp_ns - session->session_start_ns);
@@ -66,6 +70,7 @@ struct RenderReplay::Impl {
 
   const std::filesystem::path recording;
   const SceneView& scene;
+  const RecordedClock clock;
   recording::TimeOrder messages;
   Feeds feeds;
   render::RenderNode node;
@@ -101,8 +106,10 @@ std::optional<double> RenderReplay::Next() {
       RefuseOtherScene(impl_->recording, impl_->session, impl_->scene);
       continue;
     }
-    const bool known = std::apply(
-        [&](auto&... feed) { return (feed.Take(topic, message.data, &impl_->newest_ns) || ...); }, impl_->feeds);
+    const std::int64_t latest_ns = LatestStamp(impl_->clock, message.log_time_ns);
+    const bool known =
+        std::apply([&](auto&... feed) { return (feed.Take(topic, message.data, latest_ns, &impl_->newest_ns) || ...); },
+                   impl_->feeds);
     if (known && impl_->session) return impl_->TimeOf(impl_->newest_ns);
   }
   return std::nullopt;

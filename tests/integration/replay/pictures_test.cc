@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -366,21 +367,45 @@ TEST(Dataset, DestroysNoFolderAndRefusesImpossibleSteps) {
   EXPECT_TRUE(FilesBelow(session.folder()) == before);
 }
 
-TEST(IntoRender, DrawsTheSamePicturesToTheLastByte) {
-  const testing::ShortSession session("pictures_test", {.seconds = 1.6}, [](scene::SceneData* data) {
-    Small(data);
-    data->fixed.render.rate_Hz = 4;
-    data->fixed.render.png_rate_Hz = 4;
-  });
-  const auto draw = [&](const char* name) {
-    const std::filesystem::path frames = session.folder() / name;
-    fulcrum::testing::Program replayer("replayer", {session.recording(), "--into", "render", "--frames", frames});
-    std::optional<int> code;
-    fulcrum::testing::WaitFor(kPicturePatience_s, [&] { return (code = replayer.Poll()).has_value(); });
-    EXPECT_EQ(code, 0) << replayer.Said();
-    return Pictures(frames);
+void FourPicturesASecond(scene::SceneData* data) {
+  Small(data);
+  data->fixed.render.rate_Hz = 4;
+  data->fixed.render.png_rate_Hz = 4;
+}
+
+/// The files that `replayer --into render` writes into a folder `name` of the session.
+std::map<std::string, std::string> Drawn(const testing::ShortSession& session, const char* name) {
+  const std::filesystem::path frames = session.folder() / name;
+  fulcrum::testing::Program replayer("replayer", {session.recording(), "--into", "render", "--frames", frames});
+  std::optional<int> code;
+  fulcrum::testing::WaitFor(kPicturePatience_s, [&] { return (code = replayer.Poll()).has_value(); });
+  EXPECT_EQ(code, 0) << replayer.Said();
+  return Pictures(frames);
+}
+
+TEST(IntoRender, ASampleThatNoNodeTakesChangesNoPicture) {
+  int number = 0;
+  const auto leave_out = [&](ToolState* /*sample*/) { return ++number != 50 && number != 80; };
+  const auto spoil = [&](ToolState* sample) {
+    ++number;
+    constexpr std::int64_t kCentury_ns = 3'000'000'000'000'000'000;
+    if (number == 50) sample->stamp.stamp_ns = kCentury_ns;
+    if (number == 80) sample->tools[0].p_WT.x() = std::numeric_limits<float>::quiet_NaN();
+    return true;
   };
-  const auto first = draw("first"), second = draw("second");
+  const testing::ShortSession without("pictures_without", {.seconds = 1, .tool_change = leave_out},
+                                      FourPicturesASecond);
+  ASSERT_GT(number, 80);
+  number = 0;
+  const testing::ShortSession spoilt("pictures_spoilt", {.seconds = 1, .tool_change = spoil}, FourPicturesASecond);
+  const auto pictures = Drawn(without, "frames");
+  ASSERT_GE(pictures.size(), 3u);
+  EXPECT_TRUE(Drawn(spoilt, "frames") == pictures);
+}
+
+TEST(IntoRender, DrawsTheSamePicturesToTheLastByte) {
+  const testing::ShortSession session("pictures_test", {.seconds = 1.6}, FourPicturesASecond);
+  const auto first = Drawn(session, "first"), second = Drawn(session, "second");
   ASSERT_GE(first.size(), 5u);
   std::set<std::string> different;
   for (const auto& [name, bytes] : first) {
