@@ -30,6 +30,7 @@ struct SheetBody {
   Index over = kNoIndex;                     ///< Number of the solid to which it is bound; none: to all within reach.
   bool ends_held = true, sides_held = true;  ///< First and last row, first and last column.
   SheetProperties own{};                     ///< 0: that of the scene.
+  SheetHeat heat = {};                       ///< Likewise.
 };
 
 /// Throws InputError with the name of the scene.

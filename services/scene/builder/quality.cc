@@ -6,7 +6,7 @@
 #include <limits>
 #include <numbers>
 
-#include "services/base/core/sheets.h"
+#include "services/base/core/sheet_heat.h"
 #include "services/base/core/solids.h"
 #include "services/scene/builder/geometry.h"
 
@@ -184,7 +184,9 @@ std::string Describe(const SceneView& s, const SceneQuality& q) {
         is_held = is_held || s.inverse_mass[s.membrane.first + row * s.membrane.cols + col] == 0;
       }
     }
-    add("  sheet      %s: %u x %u%s", sheet.name, sheet.rows, sheet.cols,
+    add("  sheet      %s: %u x %u, %.3g mm%s%s", sheet.name, sheet.rows, sheet.cols,
+        1e3 * static_cast<double>(ThermalOf(sheet, s.thermal).thickness_m),
+        IsSpanned(sheet) ? ", air on both sides" : "",
         is_held ? "" : "; neither held nor bound, so nothing keeps it in its place");
   }
   for (const Solid& solid : s.solids) {

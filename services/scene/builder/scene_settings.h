@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "services/base/core/scene_view.h"
+#include "services/base/core/sheet_heat.h"
 #include "services/base/core/sheets.h"
 #include "services/base/core/solids.h"
 #include "services/scene/builder/operator_hand.h"
@@ -149,6 +150,7 @@ struct SheetSettings {
   std::array<std::vector<Vec3f>, 2> between_m;  ///< Points of the lines of the first and the last row.
   bool ends_held = true, sides_held = true;     ///< The first and the last row, the first and the last column.
   SheetProperties own{};                        ///< 0: that of the scene.
+  SheetHeat heat = {};                          ///< Likewise.
 };
 
 /// A ureter or nerve below the membrane, through points given as fractions of the sheet.

@@ -15,7 +15,8 @@ namespace fulcrum::scene {
 namespace {
 
 constexpr double kAtlasMargin_m = 0.001;  ///< Smallest sheet coordinate, so that a patch has texels on all sides.
-constexpr double kApart_m = 0.004;        ///< Between two sheets in the atlas: more than the heat of a burn spreads.
+constexpr double kApart_m = 0.004;        ///< Between two sheets in the atlas: more than the heat of a burn spreads,
+constexpr int kHeatTile = 32;             ///< … and than a tile of thermal_node, which has this many cells a side.
 /// The place of each sheet in the atlas begins at a multiple of a patch, so that no patch shows two.
 constexpr double kTexel_m = static_cast<double>(MembraneGrid().texel_m);
 constexpr double kPatch_m = kPatchTexels * kTexel_m;
@@ -64,9 +65,11 @@ bool IsHeld(const SheetBody& sheet, int row, int col) {
 /// Places of rectangles in the atlas, from left to right in shelves.
 class Shelves {
  public:
+  explicit Shelves(double apart_m) : apart_m_(apart_m) {}
+
   Eigen::Vector2d Put(const Eigen::Vector2d& size, double width) {
-    const auto patches = [](double length) {
-      return std::ceil((length + 2 * kAtlasMargin_m + kApart_m) / kPatch_m) * kPatch_m;
+    const auto patches = [this](double length) {
+      return std::ceil((length + 2 * kAtlasMargin_m + apart_m_) / kPatch_m) * kPatch_m;
     };
     if (x_ > 0 && x_ + size.x() > width) {
       x_ = 0;
@@ -80,7 +83,7 @@ class Shelves {
   }
 
  private:
-  double x_ = 0, y_ = 0, height_ = 0;
+  double apart_m_, x_ = 0, y_ = 0, height_ = 0;
 };
 
 }  // namespace
@@ -108,6 +111,9 @@ std::vector<SheetPart> PlaceSheets(const std::vector<SheetBody>& sheets) {
     part.bending_Nm = sheet.own.bending_Nm;
     part.fat_youngs_modulus_Pa = sheet.own.fat_youngs_modulus_Pa;
     part.tear_stretch = sheet.own.tear_stretch;
+    part.thickness_m = sheet.heat.thickness_m;
+    part.conductivity_W_mK = sheet.heat.conductivity_W_mK;
+    part.sigma_S_m = sheet.heat.sigma_S_m;
     const std::uint32_t least = row + part.rows + kRowsBetweenSheets;
     row = (least + kRowsBetweenSheets - 1) / kRowsBetweenSheets * kRowsBetweenSheets;
   }
@@ -250,7 +256,7 @@ std::vector<Vec2f> SheetMaterial(const SceneSettings& settings, const std::vecto
   const double limit = kAtlasTexels * kTexel_m - 2 * kAtlasMargin_m;
   std::vector<std::vector<Eigen::Vector2d>> flat;
   std::vector<Eigen::Vector2d> at;
-  Shelves shelves;
+  Shelves shelves(std::max(kApart_m, kHeatTile * static_cast<double>(settings.thermal.cell_m)));
   for (const SheetBody& sheet : sheets) {
     flat.push_back(FlattenSheet(sheet.grid.rows, sheet.grid.cols, sheet.nodes));
     Eigen::Vector2d extent = Eigen::Vector2d::Zero();

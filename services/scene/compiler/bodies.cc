@@ -124,6 +124,7 @@ void AddSheets(const SceneSettings& settings, const Placement& placement, const 
     sheet.ends_held = wanted.ends_held;
     sheet.sides_held = wanted.sides_held;
     sheet.own = wanted.own;
+    sheet.heat = wanted.heat;
     Named("sheet", wanted.name, [&] {
       if (wanted.over.empty()) {
         Span(wanted, placement, origin, &sheet);

@@ -16,6 +16,7 @@ using config::StrictYaml;
 
 constexpr std::size_t kLongestSource = 500, kLongestName = 31;
 const Range kModulus_kPa = Range::Between(0.01, 1e4);
+const Range kConductivity_W_mK = Range::Between(0.05, 2), kSigma_S_m = Range::Between(0.001, 5);
 
 /// A name is part of a path, which must not lead out of the folder.
 bool IsName(const std::string& name) {
@@ -39,6 +40,8 @@ NamedMaterial Read(const fs::path& file) {
   read.material.density_kg_m3 = root.NumberSi("density_kg_m3", Range::Between(100, 2e4));
   if (root.Has("thickness_mm")) read.thickness_m = root.NumberSi("thickness_mm", Range::Between(0.01, 5));
   if (root.Has("tear_stretch")) read.tear_stretch = root.Number("tear_stretch", Range::Above(1, 10));
+  if (root.Has("conductivity_W_mK")) read.conductivity_W_mK = root.NumberSi("conductivity_W_mK", kConductivity_W_mK);
+  if (root.Has("sigma_S_m")) read.sigma_S_m = root.NumberSi("sigma_S_m", kSigma_S_m);
   read.source = root.Text("source", kLongestSource);
   yaml.Finish();
   return read;

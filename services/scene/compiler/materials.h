@@ -18,6 +18,8 @@ struct NamedMaterial {
   double least_Pa = 0, most_Pa = 0;  ///< Spread of the published moduli.
   double thickness_m = 0;            ///< As a sheet; 0: not given.
   double tear_stretch = 0;           ///< As a sheet; 0: that of the scene.
+  /// As a sheet: thermal and electrical; 0: that of the scene.
+  double conductivity_W_mK = 0, sigma_S_m = 0;
   std::string source;
 };
 

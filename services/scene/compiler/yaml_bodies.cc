@@ -112,7 +112,13 @@ double BendingOf(double youngs_modulus_Pa, double thickness_m) {
   return youngs_modulus_Pa * thickness_m * thickness_m * thickness_m / 9;
 }
 
-/// What a sheet is made of, if it does not leave that to the section `physics`.
+/// A value of the sheet's own that concerns heat: 0, or at least `least`.
+void ReadOwn(StrictMap* map, const char* key, double most, float least, const char* reason, float* value) {
+  *value = static_cast<float>(map->NumberSi(key, static_cast<double>(*value), Range::Between(0, most)));
+  if (*value > 0.0f && *value < least) map->Fail(key, reason);
+}
+
+/// What a sheet is made of, if it does not leave that to the sections `physics` and `thermal`.
 void ReadSheetMaterial(StrictMap* map, const MaterialLibrary& materials, SheetSettings* sheet) {
   constexpr double kLeastEt_N_per_m = 1e-3;
   constexpr float kLeastFat_Pa = 1;
@@ -133,7 +139,17 @@ void ReadSheetMaterial(StrictMap* map, const MaterialLibrary& materials, SheetSe
     sheet->own.bending_Nm = static_cast<float>(BendingOf(modulus_Pa, named.thickness_m));
     sheet->grid.density_kg_m2 = std::max(named.material.density_kg_m3 * named.thickness_m, kLeastDensity_kg_m2);
     tear_stretch = named.tear_stretch;
+    sheet->heat = {static_cast<float>(named.thickness_m), static_cast<float>(named.conductivity_W_mK),
+                   static_cast<float>(named.sigma_S_m)};
+  } else {
+    // Without a material the stiffness is that of `physics`, whatever the thickness.
+    ReadOwn(map, "thickness_mm", 5, kSheetThicknessMin_m, "must be at least 0.01, or 0 (that of `thermal`)",
+            &sheet->heat.thickness_m);
   }
+  ReadOwn(map, "conductivity_W_mK", 2, kSheetConductivityMin_W_mK, "must be at least 0.05, or 0 (that of `thermal`)",
+          &sheet->heat.conductivity_W_mK);
+  ReadOwn(map, "sigma_S_m", 5, kSheetSigmaMin_S_m, "must be at least 0.001, or 0 (that of `thermal`)",
+          &sheet->heat.sigma_S_m);
   ReadSi(map, "density_kg_m2", Range::Between(kLeastDensity_kg_m2, 50), &sheet->grid.density_kg_m2);
   sheet->own.fat_youngs_modulus_Pa =
       static_cast<float>(map->NumberSi("fat_youngs_modulus_kPa", 0, Range::Between(0, 1e6)));

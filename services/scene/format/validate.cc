@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "services/base/core/sheet_heat.h"
 #include "services/base/core/sheets.h"
 #include "services/base/core/solids.h"
 #include "services/scene/format/validate_checks.h"
@@ -103,6 +104,12 @@ void CheckSheets(const SceneView& s) {
     if (sheet.tear_stretch != 0.0f && !(sheet.tear_stretch > 1.0f + s.physics.membrane_prestrain)) {
       Fail("sheets", "element ", i, ": tear_stretch ", sheet.tear_stretch, "; valid: above 1 + membrane_prestrain");
     }
+    const auto own = [&](const char* what, float value, float low, float high) {
+      if (value != 0.0f) CheckRange("sheets", what, i, value, double{low}, double{high});
+    };
+    own("thickness", sheet.thickness_m, kSheetThicknessMin_m, kSheetThicknessMax_m);
+    own("conductivity", sheet.conductivity_W_mK, kSheetConductivityMin_W_mK, kSheetConductivityMax_W_mK);
+    own("sigma", sheet.sigma_S_m, kSheetSigmaMin_S_m, kSheetSigmaMax_S_m);
     least = end + kRowsBetweenSheets;
     widest = std::max(widest, sheet.cols);
   }

@@ -106,6 +106,26 @@ TEST_F(MaterialsTest, ASheetTakesItsProperties) {
   EXPECT_FLOAT_EQ(other.sheets[0].tear_stretch, 3);
 }
 
+TEST_F(MaterialsTest, ASheetTakesItsHeat) {
+  const auto heat_of = [&](const char* sheet) {
+    const SceneData data = BuildScene(Read("material: liver", sheet).settings, {});
+    const SheetPart& part = data.sheets[0];
+    return std::array{part.thickness_m, part.conductivity_W_mK, part.sigma_S_m};
+  };
+  EXPECT_EQ(heat_of(", held: ends"), (std::array{0.0f, 0.0f, 0.0f})) << "that of `thermal`";
+  EXPECT_EQ(heat_of(", thickness_mm: 1, conductivity_W_mK: 0.5, sigma_S_m: 0.2"), (std::array{1e-3f, 0.5f, 0.2f}));
+  const SceneData plain = BuildScene(Read("material: liver", ", thickness_mm: 1").settings, {});
+  EXPECT_EQ(plain.sheets[0].Et_N_per_m, 0) << "without a material the stiffness is that of `physics`";
+  Write("gel.yaml", kGel);
+  EXPECT_EQ(heat_of(", material: gel"), (std::array{0.5e-3f, 0.0f, 0.0f}));
+  Write("gel.yaml", std::string(kGel) + "conductivity_W_mK: 0.6\nsigma_S_m: 1.5\n");
+  EXPECT_EQ(heat_of(", material: gel"), (std::array{0.5e-3f, 0.6f, 1.5f}));
+  EXPECT_EQ(heat_of(", material: gel, thickness_mm: 0.2, sigma_S_m: 0"), (std::array{0.2e-3f, 0.6f, 0.0f}));
+  const SceneDescription read = Read("material: liver", ", material: gel");
+  const SceneDescription again = ParseSceneYaml(read.effective_yaml, "again.yaml", {});
+  EXPECT_EQ(BuildScene(again.settings, {}).fixed.hash, BuildScene(read.settings, {}).fixed.hash);
+}
+
 // A recording's scene is read again elsewhere (replayer --set), where the files beside it are not.
 TEST_F(MaterialsTest, TheEffectiveDescriptionNeedsNoFileOfTheirs) {
   Write("gel.yaml", kGel);
@@ -145,11 +165,18 @@ TEST_F(MaterialsTest, BadOnesAreRefused) {
   expect(RefusalOf("material: liver", ", material: gel, thickness_mm: 0.01, youngs_modulus_kPa: 0.01"),
          "at least 0.001 N/m");
   expect(RefusalOf("material: liver", ", fat_youngs_modulus_kPa: 0.0001"), "must be at least 0.001");
-  expect(RefusalOf("material: liver", ", thickness_mm: 1"), "thickness_mm");
+  expect(RefusalOf("material: liver", ", thickness_mm: 0.001"), "thickness_mm: must be at least 0.01, or 0");
+  expect(RefusalOf("material: liver", ", thickness_mm: 6"), "thickness_mm");
+  expect(RefusalOf("material: liver", ", conductivity_W_mK: 0.01"), "conductivity_W_mK: must be at least 0.05, or 0");
+  expect(RefusalOf("material: liver", ", conductivity_W_mK: 3"), "conductivity_W_mK");
+  expect(RefusalOf("material: liver", ", sigma_S_m: 0.0001"), "sigma_S_m: must be at least 0.001, or 0");
+  expect(RefusalOf("material: liver", ", sigma_S_m: .nan"), "sigma_S_m");
   Write("gel.yaml", std::string(kGel) + "viscosity: 3\n");
   expect(RefusalOf("material: gel", ""), "gel.yaml:8: viscosity");
   Write("gel.yaml", std::string(kGel).replace(std::string(kGel).find("tear_stretch: 2"), 15, "tear_stretch: 0.5"));
   expect(RefusalOf("material: gel", ""), "gel.yaml:6: tear_stretch");
+  Write("gel.yaml", std::string(kGel) + "sigma_S_m: 7\n");
+  expect(RefusalOf("material: gel", ""), "gel.yaml:8: sigma_S_m");
   Write("gel.yaml", "look: fat\nyoungs_modulus_kPa: 40\nspread_kPa: [50, 60]\ndensity_kg_m3: 1000\nsource: no\n");
   expect(RefusalOf("material: gel", ""), "gel.yaml:3: spread_kPa: must contain youngs_modulus_kPa");
 }

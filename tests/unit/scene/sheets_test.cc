@@ -140,7 +140,8 @@ TEST_F(ThreeSheets, AreWrittenReadAndDescribed) {
   EXPECT_EQ(read.view().sheets.size(), 3u);
   std::filesystem::remove(file);
   const std::string text = Describe(scene_, Measure(scene_));
-  EXPECT_NE(text.find("capsule: 25 x 15"), std::string::npos) << text;
+  EXPECT_NE(text.find("capsule: 25 x 15, 0.3 mm"), std::string::npos) << text;
+  EXPECT_NE(text.find("band: 21 x 2, 0.3 mm, air on both sides"), std::string::npos) << text;
   EXPECT_EQ(text.find("nan"), std::string::npos) << text;
 }
 
@@ -162,6 +163,12 @@ TEST_F(ThreeSheets, AreRefusedWhereTheyDoNotFitTheGrid) {
   EXPECT_EQ(fault([](SceneData* d) { d->sheets[1].bending_Nm = std::nanf(""); }), "sheets");
   EXPECT_EQ(fault([](SceneData* d) { d->sheets[1].fat_youngs_modulus_Pa = 2e9f; }), "sheets");
   EXPECT_EQ(fault([](SceneData* d) { d->sheets[1].tear_stretch = 0.9f; }), "sheets");
+  for (float SheetPart::*own : {&SheetPart::thickness_m, &SheetPart::conductivity_W_mK, &SheetPart::sigma_S_m}) {
+    for (const float bad : {-1.0f, 1e-6f, 9.0f, std::nanf("")}) {
+      EXPECT_EQ(fault([&](SceneData* d) { d->sheets[1].*own = bad; }), "sheets") << bad;
+    }
+  }
+  EXPECT_EQ(fault([](SceneData* d) { d->sheets[1].thickness_m = 1e-5f, d->sheets[1].sigma_S_m = 1.5f; }), "");
   EXPECT_EQ(fault([](SceneData* d) { d->fixed.membrane.rows += 1; }), "rest_position");
   EXPECT_EQ(fault([](SceneData* d) { d->sheets[2].rows -= 1; }), "sheets") << "the last row of the grid is no sheet's";
   EXPECT_EQ(fault([](SceneData* d) { d->sheets.erase(d->sheets.begin()); }), "sheets") << "nor is the first";
