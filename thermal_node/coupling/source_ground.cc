@@ -1,9 +1,12 @@
 // Where the current of the source window goes: the leak to the tissue beneath, the far field beyond the window, and the
-// Joule heat there, sigma (dV/dr)^2, tented ~ 1 / r^2. Both for a flat sheet of one conductivity.
+// Joule heat there, sigma (dV/dr)^2, tented ~ 1 / r^2, in a band that of a strip (band_field). All for a flat sheet of
+// one conductivity.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
+#include "thermal_node/coupling/band_field.h"
 #include "thermal_node/coupling/source_window.h"
 #include "thermal_node/heat/wide.h"
 
@@ -146,8 +149,8 @@ float SourceWindow::MetalRadius() const {
 }
 
 void SourceWindow::SetLeak(const Vec2f& middle, bool tented) {
-  const float cell = material_.cell_m, even = tented ? 0.0f : material_.leak_S_m2 * cell * cell * metric_.area();
-  const float least = MetalRadius(), wave = material_.spreading * material_.fat_depth_m / cell;
+  const float cell = material_->cell_m, even = tented ? 0.0f : material_->leak_S_m2 * cell * cell * metric_.area();
+  const float least = MetalRadius(), wave = material_->spreading * material_->fat_depth_m / cell;
   const float x0 = static_cast<float>(corner_.ix + sheet_.origin_x) + 0.5f - middle.x() / cell;
   const float y0 = static_cast<float>(corner_.iy + sheet_.origin_y) + 0.5f - middle.y() / cell;
   for (int j = 0; j < kWindow; ++j) {
@@ -156,9 +159,25 @@ void SourceWindow::SetLeak(const Vec2f& middle, bool tented) {
   }
 }
 
+/// What the band is spanned between is at 0 V, half a cell beyond its last cells.
+void SourceWindow::GroundEnds(const Band& band) {
+  for (const CellIndex& cell : band.ends) {
+    const int i = cell.ix - corner_.ix, j = cell.iy - corner_.iy;
+    if (i < 0 || j < 0 || i >= kWindow || j >= kWindow) continue;
+    const int k = j * kWindow + i;
+    problem_.ground[k] += 2.0f * problem_.face_t * problem_.sigma[k];
+  }
+}
+
 void SourceWindow::SetGround(const Vec2f& middle, bool tented) {
-  const float cell = material_.cell_m;
+  const float cell = material_->cell_m;
   problem_.ground = leak_;
+  std::optional<BandField> strip;
+  if (const Band* band = sheet_.BandOf(number_)) {
+    strip.emplace(*band, middle);
+    GroundEnds(*band);
+  }
+  const FarField& far = far_[static_cast<std::size_t>(number_)];
   // Current that leaves the window: the conductance of the sheet's far field at each face of the border, in series with
   // the half cell before it.
   far_middle_ = middle;
@@ -169,12 +188,14 @@ void SourceWindow::SetGround(const Vec2f& middle, bool tented) {
                                 static_cast<float>(corner_.iy + j + sheet_.origin_y) + 0.5f) +
                           0.5f * normal - middle / cell;
     const float r_m = std::max(r_cells.norm(), 1.0f) * cell;
-    const float kappa = tented ? 1.0f / (r_m * std::log(std::max(kTentRadius_m / r_m, 1.2f))) : far_.SlopeAt(r_m);
+    const float kappa = tented ? 1.0f / (r_m * std::log(std::max(kTentRadius_m / r_m, 1.2f))) : far.SlopeAt(r_m);
     const float cosine = std::max(0.0f, r_cells.dot(normal) * cell / r_m);
-    const float slope = cell * stretch * kappa * cosine;  // relative slope of the potential per cell
+    // Relative slope of the potential per cell.
+    const float slope =
+        strip ? cell * stretch * strip->SlopeAt(r_cells * cell + middle, normal) : cell * stretch * kappa * cosine;
     const float conductance = face * problem_.sigma[j * kWindow + i] * slope / (1.0f + 0.5f * slope);
     // The half cell's heat, two hundredths of it, is counted as heat beyond.
-    const float share = tented ? 1.0f : far_.ShareAt(r_m);
+    const float share = tented || strip ? 1.0f : far.ShareAt(r_m);
     problem_.ground[j * kWindow + i] += conductance;
     border_[face_count++] = {static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(j), share * conductance,
                              (1.0f - share) * conductance};
@@ -216,20 +237,29 @@ void SourceWindow::AddFar(float v2_s) {
 void SourceWindow::DepositFar(HeatField* field, bool hold, Ledger* ledger) {
   const double heat = std::exchange(far_J_, 0.0);
   if (!(heat > 0.0)) return;
-  const float cell = material_.cell_m, reach = far_.reach_m() / cell;
+  const FarField& far = far_[static_cast<std::size_t>(number_)];
+  const float cell = material_->cell_m, reach = far.reach_m() / cell;
   // Middle in cells of the sheet's tiles.
   const Vec2f origin(static_cast<float>(sheet_.origin_x), static_cast<float>(sheet_.origin_y));
   const Vec2f middle = far_middle_ / cell - origin;
+  Vec2f low = middle - Vec2f::Constant(reach), high = middle + Vec2f::Constant(reach);
+  std::optional<BandField> strip;
+  if (const Band* band = sheet_.BandOf(number_)) {
+    strip.emplace(*band, far_middle_);
+    low = band->low / cell - origin;
+    high = low + band->size / cell;
+  }
   const auto tile_of = [](float cells) { return static_cast<int>(std::floor(cells / kTile)); };
   const auto density_at = [&](int ix, int iy) {
     const Vec2f centre = Vec2f(static_cast<float>(ix), static_cast<float>(iy)) + Vec2f::Constant(0.5f * kBlock);
+    if (strip) return strip->DensityAt((centre + origin) * cell);
     const float r = std::max((centre - middle).norm(), 1.0f);
-    return r >= reach ? 0.0f : far_tented_ ? 1.0f / (r * r) : far_.DensityAt(r * cell);
+    return r >= reach ? 0.0f : far_tented_ ? 1.0f / (r * r) : far.DensityAt(r * cell);
   };
   std::vector<Part> parts;
   double cells = 0;  // of density
-  for (int ty = tile_of(middle.y() - reach); ty <= tile_of(middle.y() + reach); ++ty) {
-    for (int tx = tile_of(middle.x() - reach); tx <= tile_of(middle.x() + reach); ++tx) {
+  for (int ty = tile_of(low.y()); ty <= tile_of(high.y()); ++ty) {
+    for (int tx = tile_of(low.x()); tx <= tile_of(high.x()); ++tx) {
       const int column = corner_.ix - tx * kTile, row = corner_.iy - ty * kTile;  // where the window begins
       Part part{tx, ty, row, row + kWindow};
       for (int block = 0; block < kBlocks; ++block) {
@@ -253,11 +283,11 @@ void SourceWindow::DepositFar(HeatField* field, bool hold, Ledger* ledger) {
     }
   }
   if (!(cells > 0.0)) return;
-  const double volume = static_cast<double>(cell * cell * material_.thickness_m * metric_.area());
+  const double volume = static_cast<double>(cell * cell * material_->thickness_m * metric_.area());
   const auto scale = static_cast<float>(heat / (cells * volume));
   if (!std::isfinite(scale)) return;  // where the density at the border is next to nothing
   for (const Part& part : parts) {
-    Tile* const tile = field->Wake(part.tx, part.ty);
+    Tile* const tile = TileAt(field, part.tx * kTile, part.ty * kTile);
     if (tile == nullptr) continue;
     const float given = HeatCells(part, scale, tile);
     ledger->joule += static_cast<double>(given) * static_cast<double>(tile->flat_volume);

@@ -43,7 +43,7 @@ void SourceWindow::AddGap(int i, int j, float gap) {
 
 /// Interpolates each cell's gap linearly between the two samples.
 void SourceWindow::AddFootprint(const TipPath& path, float at, float reach) {
-  const float u = path.part_from + at * (path.part_to - path.part_from), per_cell = 1.0f / material_.cell_m;
+  const float u = path.part_from + at * (path.part_to - path.part_from), per_cell = 1.0f / material_->cell_m;
   const Vec2f shift = path.displacement * per_cell;
   const auto cells = [](const Vec2f& v) {
     return CellIndex{static_cast<std::int32_t>(std::lround(v.x())), static_cast<std::int32_t>(std::lround(v.y()))};
@@ -77,7 +77,7 @@ void SourceWindow::AddFootprint(const TipPath& path, float at, float reach) {
 }
 
 void SourceWindow::AddCapsule(const TipPath& path, float at, float reach) {
-  const float per_cell = 1.0f / material_.cell_m, radius = path.radius_m * per_cell;
+  const float per_cell = 1.0f / material_->cell_m, radius = path.radius_m * per_cell;
   const Vec2f origin(static_cast<float>(corner_.ix + sheet_.origin_x),
                      static_cast<float>(corner_.iy + sheet_.origin_y));
   const Vec2f middle = (path.from + at * (path.to - path.from)) * per_cell - origin;
@@ -106,7 +106,7 @@ void SourceWindow::SetGaps(const TipPath& path, float at, float reach_m) {
   }
   gap_low_ = {kWindow, kWindow};
   gap_high_ = {-1, -1};
-  const float reach = reach_m / material_.cell_m;
+  const float reach = reach_m / material_->cell_m;
   path.end.width > 0 ? AddFootprint(path, at, reach + 1.0f) : AddCapsule(path, at, reach);
 }
 

@@ -30,8 +30,8 @@ void LoadTissue(const std::uint8_t* __restrict flags, const float* __restrict in
 
 }  // namespace
 
-SourceWindow::SourceWindow(const Material& material, const Sheet& sheet)
-    : material_(material), sheet_(sheet), far_(material) {
+SourceWindow::SourceWindow(std::span<const Material> materials, const Sheet& sheet)
+    : materials_(materials), sheet_(sheet), material_(materials.data()), far_(materials.begin(), materials.end()) {
   gap_.fill(kFarGap);
 }
 
@@ -59,8 +59,18 @@ void SourceWindow::MoveTo(CellIndex corner) {
   corner_ = corner;
 }
 
+void SourceWindow::SelectMaterial(int number) {
+  number_ = number;
+  material_ = &materials_[static_cast<std::size_t>(number)];
+}
+
+Tile* SourceWindow::TileAt(HeatField* field, int ix, int iy) const {
+  if (ix < 0 || iy < 0 || sheet_.MaterialOf(ix / kTile, iy / kTile) != number_) return nullptr;
+  return field->Wake(ix / kTile, iy / kTile);
+}
+
 /// Visits every run of cells of one window row within one tile: visit(tile, cell in tile, cell in window, count). Cells
-/// beyond the sheet are visited with tile == nullptr.
+/// beyond the sheet are visited or of another material with tile == nullptr.
 template <class Visit>
 void SourceWindow::ForTileRows(HeatField* field, const Visit& visit) {
   const auto place = [](int cell) { return ((cell % kTile) + kTile) % kTile; };  // in its tile
@@ -70,7 +80,7 @@ void SourceWindow::ForTileRows(HeatField* field, const Visit& visit) {
     for (int i = 0, run = 0; i < kWindow; i += run) {
       const int ix = corner_.ix + i, in_x = place(ix);
       run = std::min(kTile - in_x, kWindow - i);
-      Tile* tile = ix >= 0 && iy >= 0 ? field->Wake(ix / kTile, iy / kTile) : nullptr;
+      Tile* tile = TileAt(field, ix, iy);
       for (int n = 0; n < rows; ++n) visit(tile, (in_y + n) * kTile + in_x, (j + n) * kWindow + i, run);
     }
   }
@@ -80,7 +90,7 @@ void SourceWindow::RefreshTiles(HeatField* field, Ledger* ledger) {
   for (int n = 0; n < 9; ++n) {
     const int ix = corner_.ix + std::min((n % 3) * kTile, kWindow - 1);
     const int iy = corner_.iy + std::min((n / 3) * kTile, kWindow - 1);
-    Tile* tile = ix >= 0 && iy >= 0 ? field->Wake(ix / kTile, iy / kTile) : nullptr;
+    Tile* tile = TileAt(field, ix, iy);
     if (tile != nullptr) field->RefreshTheta(tile, ledger);
   }
 }
@@ -101,7 +111,7 @@ void SourceWindow::Load(HeatField* field, Ledger* ledger) {
     std::copy_n(&tile->state.enthalpy[from], count, &enthalpy_[to]);
     std::copy_n(&tile->state.water[from], count, &water_[to]);
     std::copy_n(&tile->state.flags[from], count, &flags_[to]);
-    LoadTissue(&tile->state.flags[from], &tile->geometry.inverse_area[from], tile->flat_volume, material_.sigma, count,
+    LoadTissue(&tile->state.flags[from], &tile->geometry.inverse_area[from], tile->flat_volume, material_->sigma, count,
                &inverse_volume_[to], &tissue_[to]);
   });
 }
@@ -123,8 +133,8 @@ void SourceWindow::Store(HeatField* field, bool tented) {
 
 FULCRUM_WIDE
 void SourceWindow::SetSigma() {
-  const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
-  const float boil = material_.theta_boil, slope = material_.sigma_per_K;
+  const float rc_dry = material_->rc_dry, rc_water = material_->rc_wet - material_->rc_dry;
+  const float boil = material_->theta_boil, slope = material_->sigma_per_K;
   for (int k = 0; k < kWindowCells; ++k) {
     const float theta = enthalpy_[k] / (rc_dry + water_[k] * rc_water);
     const float capped = std::min(std::max(theta, 0.0f), boil);
@@ -136,9 +146,9 @@ void SourceWindow::SetSigma() {
 void SourceWindow::SetContact(const Drive& drive) {
   problem_.contact.fill(0);
   problem_.lost.fill(0);
-  const float cell = material_.cell_m, area = cell * cell * metric_.area();
+  const float cell = material_->cell_m, area = cell * cell * metric_.area();
   // Conductance per area from the touched face to the middle of the sheet: sigma / (d / 2).
-  const float per_sigma = (1.0f - interface_.film) * 2.0f * area / material_.thickness_m;
+  const float per_sigma = (1.0f - interface_.film) * 2.0f * area / material_->thickness_m;
   const float burning = interface_.film * interface_.burning * kDischarge_S_m2 * area;
   const float per_arc = drive.arc_m > 0.0f ? cell / drive.arc_m : 1e6f, per_reach = cell / kFilmReach_m;
   for (int j = gap_low_.iy; j <= gap_high_.iy; ++j) {
@@ -158,9 +168,9 @@ void SourceWindow::SetContact(const Drive& drive) {
 }
 
 float SourceWindow::Boiling() const {
-  const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
+  const float rc_dry = material_->rc_dry, rc_water = material_->rc_wet - material_->rc_dry;
   constexpr float kNearlyBoils = 0.98f;
-  const float reach = kFilmReach_m / material_.cell_m;
+  const float reach = kFilmReach_m / material_->cell_m;
   float all = 0, boiling = 0;
   for (int j = gap_low_.iy; j <= gap_high_.iy; ++j) {
     for (int i = gap_low_.ix; i <= gap_high_.ix; ++i) {
@@ -168,7 +178,7 @@ float SourceWindow::Boiling() const {
       if (!(gap_[k] < reach) || !(tissue_[k] > 0.0f)) continue;
       const float weight = std::min(1.0f - gap_[k] / reach, 1.0f);
       all += weight;
-      const bool boils = enthalpy_[k] >= kNearlyBoils * (rc_dry + water_[k] * rc_water) * material_.theta_boil;
+      const bool boils = enthalpy_[k] >= kNearlyBoils * (rc_dry + water_[k] * rc_water) * material_->theta_boil;
       boiling += boils ? weight : 0.0f;
     }
   }
@@ -176,9 +186,9 @@ float SourceWindow::Boiling() const {
 }
 
 void SourceWindow::ExchangeWithHook(float dt_s, Ledger* ledger) {
-  const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
+  const float rc_dry = material_->rc_dry, rc_water = material_->rc_wet - material_->rc_dry;
   const float transfer = kHookContact_W_m2K + interface_.film * (kHookFilm_W_m2K - kHookContact_W_m2K);
-  const float per_area = transfer * dt_s / material_.thickness_m;  // [J/m^3K] of a covered cell
+  const float per_area = transfer * dt_s / material_->thickness_m;  // [J/m^3K] of a covered cell
   double given = 0;
   for (int j = gap_low_.iy; j <= gap_high_.iy; ++j) {
     for (int i = gap_low_.ix; i <= gap_high_.ix; ++i) {
@@ -221,8 +231,8 @@ void SourceWindow::LeaveOutFilm() {
 
 FULCRUM_WIDE
 float SourceWindow::Change(float v2_s, float heat_S) const {
-  const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
-  const float boil = material_.theta_boil, slope = material_.sigma_per_K, per_latent = 1.0f / material_.latent;
+  const float rc_dry = material_->rc_dry, rc_water = material_->rc_wet - material_->rc_dry;
+  const float boil = material_->theta_boil, slope = material_->sigma_per_K, per_latent = 1.0f / material_->latent;
   alignas(64) float sum[kWindow] = {};
   for (int j = 0; j < kWindow; ++j) {
     if (potential_.row_heat()[j] < kFaintRow * heat_S) continue;
@@ -266,8 +276,8 @@ float SourceWindow::StepByChange(float v2, float heat_S, float longest) const {
 
 FULCRUM_WIDE
 void SourceWindow::BoilRow(int j, float remove_theta, Ledger* ledger) {
-  const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
-  const float boil = material_.theta_boil, latent = material_.latent, too_hot = rc_dry * std::max(remove_theta, boil);
+  const float rc_dry = material_->rc_dry, rc_water = material_->rc_wet - material_->rc_dry;
+  const float boil = material_->theta_boil, latent = material_->latent, too_hot = rc_dry * std::max(remove_theta, boil);
   float* __restrict h = &enthalpy_[j * kWindow];
   float* __restrict w = &water_[j * kWindow];
   const float* __restrict tissue = &tissue_[j * kWindow];
@@ -314,8 +324,8 @@ void SourceWindow::RemoveDry(int j, float too_hot, Ledger* ledger) {
 
 FULCRUM_WIDE
 void SourceWindow::Deposit(float v2_s, float remove_theta, Ledger* ledger) {
-  const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
-  const float boil = material_.theta_boil;
+  const float rc_dry = material_->rc_dry, rc_water = material_->rc_wet - material_->rc_dry;
+  const float boil = material_->theta_boil;
   for (int j = 0; j < kWindow; ++j) {
     const float* __restrict q = &potential_.heat()[j * kWindow];
     float* __restrict h = &enthalpy_[j * kWindow];
@@ -334,19 +344,21 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
   const Vec2f centre = 0.5f * (path.from + path.to);
   const CellIndex middle = sheet_.CellOf(centre);
   // The heat beyond the window belongs to the place and the kind of contact before.
-  const float away = (centre - far_middle_).norm() / material_.cell_m;
-  if (path.tented != far_tented_ || away > kFarAway) DepositFar(field, false, ledger);
+  const float away = (centre - far_middle_).norm() / material_->cell_m;
+  const int number = sheet_.MaterialAt(middle);
+  if (path.tented != far_tented_ || away > kFarAway || number != number_) DepositFar(field, false, ledger);
+  SelectMaterial(number);
   MoveTo({middle.ix - kWindow / 2, middle.iy - kWindow / 2});
   Load(field, ledger);
   metric_ = sheet_.MetricAt(static_cast<float>(middle.ix), static_cast<float>(middle.iy));
-  problem_.face_s = material_.thickness_m * metric_.tt / metric_.area();
-  problem_.face_t = material_.thickness_m * metric_.ss / metric_.area();
+  problem_.face_s = material_->thickness_m * metric_.tt / metric_.area();
+  problem_.face_t = material_->thickness_m * metric_.ss / metric_.area();
   SetSigma();
   const float reach_m = std::max(drive.arc_m, kFilmReach_m);
   SetGaps(path, 0.5f, reach_m);
   SetLeak(centre, path.tented);
   SetGround(centre, path.tented);
-  const float cells = (path.to - path.from).norm() / material_.cell_m;
+  const float cells = (path.to - path.from).norm() / material_->cell_m;
   const float by_travel = duration_s / std::clamp(cells / kMaxTravel, 1.0f, kMaxStepsByTravel);
   const float by_film = drive.discharges ? kFilmStep_s : by_travel;
   const float longest = std::max(std::min(by_travel, by_film), std::min(min_step_s, duration_s));

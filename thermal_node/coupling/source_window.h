@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -91,7 +92,9 @@ struct SourceStats {
 
 class SourceWindow {
  public:
-  SourceWindow(const Material& material, const Sheet& sheet);
+  /// Both must outlive it. The material is that of the sheet beneath the contact; cells of others count as missing.
+  SourceWindow(std::span<const Material> materials, const Sheet& sheet);
+  SourceWindow(const Material& material, const Sheet& sheet) : SourceWindow(std::span(&material, 1), sheet) {}
 
   /// Heats the sheet for `duration_s` while the tip moves along the path.
   void Run(HeatField* field, const TipPath& path, const Drive& drive, float duration_s, Ledger* ledger);
@@ -135,12 +138,16 @@ class SourceWindow {
 
  private:
   void MoveTo(CellIndex corner);
+  void SelectMaterial(int number);
+  /// The tile around a cell, awake; nullptr: it is none of the window's material.
+  [[nodiscard]] Tile* TileAt(HeatField* field, int ix, int iy) const;
   void RefreshTiles(HeatField* field, Ledger* ledger);
   void Load(HeatField* field, Ledger* ledger);
   /// Copies the window back to the tiles. All tiles under the window are marked as the tip's place is: tented or not.
   void Store(HeatField* field, bool tented);
   void SetLeak(const Vec2f& middle, bool tented);
   void SetGround(const Vec2f& middle, bool tented);
+  void GroundEnds(const Band& band);
   /// Sets the gap of each cell from the metal at fraction `at` of the path.
   void SetGaps(const TipPath& path, float at, float reach_m);
   void AddCapsule(const TipPath& path, float at, float reach);
@@ -174,14 +181,16 @@ class SourceWindow {
   template <class Visit>
   void ForTileRows(HeatField* field, const Visit& visit);
 
-  const Material& material_;
+  std::span<const Material> materials_;
   const Sheet& sheet_;
+  const Material* material_;  ///< Of the last Run.
+  int number_ = 0;            ///< Of that material.
   PotentialSolver potential_;
   PotentialProblem problem_;
   CellIndex corner_ = kNowhere;
-  float step_s_ = 0;      ///< Last coupling step [s], the estimate for the length of the next one.
-  SurfaceMetric metric_;  ///< Metric under the tip, used for the whole window.
-  FarField far_;
+  float step_s_ = 0;           ///< Last coupling step [s], the estimate for the length of the next one.
+  SurfaceMetric metric_;       ///< Metric under the tip, used for the whole window.
+  std::vector<FarField> far_;  ///< By material.
   /// Conductance of each face of the window's border to the far field: four times a side.
   struct BorderFace {
     std::uint8_t i = 0, j = 0;

@@ -6,6 +6,7 @@
 
 #include "services/base/core/hash.h"
 #include "thermal_node/coupling/tip_parts.h"
+#include "thermal_node/heat/sheet_materials.h"
 
 namespace fulcrum::thermal {
 namespace {
@@ -22,26 +23,29 @@ ThermalParams SheetParams(ThermalParams params) {
   return params;
 }
 
+std::vector<Material> MaterialsOf(const SheetScene& scene) {
+  if (scene.thermal.model == ThermalModel::kPaper) return MakeMaterials(scene, scene.thermal, MakePaperMaterial);
+  return MakeMaterials(scene, SheetParams(scene.thermal), MakeMaterial);
+}
+
 }  // namespace
 
 ThermalSolver::ThermalSolver(const SheetScene& scene)
     : params_(scene.thermal),
-      material_(scene.thermal.model == ThermalModel::kPaper ? MakePaperMaterial(scene.thermal)
-                                                            : MakeMaterial(SheetParams(scene.thermal))),
-      field_(MakeSheet(scene), material_),
+      field_(MakeSheet(scene), MaterialsOf(scene)),
       topology_(scene, field_.sheet()),
-      damage_(material_.body_C),
+      damage_(field_.material().body_C),
       protected_(scene, field_),
-      source_(material_, field_.sheet()) {
+      source_(field_.materials(), field_.sheet()) {
   if (scene.thermal.model == ThermalModel::kPaper) paper_ = std::make_unique<PaperModel>(scene, field_.sheet());
   events_.reserve(64);
   alarms_.reserve(16);
   if (params_.volume != 0 && paper_ == nullptr && field_.sheet().tile_count() > 0) {
     volume_ = std::make_unique<VolumeField>(field_.sheet(), params_);
-    contact_ = std::make_unique<SheetContact>(material_, volume_->material());
+    contact_ = std::make_unique<SheetContact>(field_.materials(), volume_->material());
     source_.KeepLeak();
   }
-  figures_.highest_C = figures_.present_C = material_.body_C;
+  figures_.highest_C = figures_.present_C = field_.material().body_C;
 }
 
 bool ThermalSolver::Idle(std::span<const TipInput> tips) const {
@@ -57,7 +61,7 @@ void ThermalSolver::Step(std::span<const TipInput> tips, float dt_s) {
   committed_ = false;
   stepped_ = !Idle(tips);
   source_.CoolHook(dt_s);
-  figures_.hook_C = material_.body_C + source_.interface().hook_theta;
+  figures_.hook_C = field_.material().body_C + source_.interface().hook_theta;
   if (!stepped_) {
     memory_.energised = 0;
     figures_.power_W = figures_.set_power_W = 0;
@@ -75,7 +79,7 @@ void ThermalSolver::Step(std::span<const TipInput> tips, float dt_s) {
     figures_.set_power_W = tips.back().active ? tips.back().power_W : 0.0f;
     last_tip_ = tips.back();
   }
-  figures_.present_C = material_.body_C + field_.MaxTheta();
+  figures_.present_C = field_.material().body_C + field_.MaxTheta();
   figures_.highest_C = std::max(figures_.highest_C, figures_.present_C);
   ReportEvents(last_tip_);
 }
@@ -265,7 +269,7 @@ void ThermalSolver::Report(ThermalEventKind kind, const Vec2f& at, float theta, 
   float& quiet_until = memory_.quiet_until_s[static_cast<std::size_t>(kind)];
   if (clock_s_ < quiet_until) return;
   quiet_until = clock_s_ + quiet_s;
-  events_.push_back({kind, at, material_.body_C + theta, value});
+  events_.push_back({kind, at, field_.material().body_C + theta, value});
 }
 
 void ThermalSolver::ReportEvents(const TipInput& tip) {
@@ -276,7 +280,7 @@ void ThermalSolver::ReportEvents(const TipInput& tip) {
   }
   memory_.energised = tip.active ? 1 : 0;
   if (ledger_.vapour > memory_.vapour && tip.active) {
-    Report(ThermalEventKind::kSteam, at, material_.theta_boil, figures_.power_W, kSteamQuiet_s);
+    Report(ThermalEventKind::kSteam, at, field_.material().theta_boil, figures_.power_W, kSteamQuiet_s);
   }
   memory_.vapour = ledger_.vapour;
   const bool opens = tip.active && memory_.opened == 0 && source_.stats().removed_cells > 0;

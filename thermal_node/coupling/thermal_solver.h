@@ -144,7 +144,6 @@ class ThermalSolver {
   };
 
   ThermalParams params_;
-  Material material_;
   HeatField field_;
   MeshTopology topology_;
   DamageModel damage_;

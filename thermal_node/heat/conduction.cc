@@ -215,17 +215,17 @@ void HeatField::Cool(Tile* tile, float dt_s, Ledger* ledger) const {
   const float loss = dt_s * SinkOf(*tile);
   const double before = tile->Heat();
   for (int cell = 0; cell < kTileCells; ++cell) {
-    tile->state.enthalpy[cell] *= std::exp(-loss / material_.HeatCapacity(tile->state.water[cell]));
+    tile->state.enthalpy[cell] *= std::exp(-loss / tile->material->HeatCapacity(tile->state.water[cell]));
   }
   ledger->lost += before - tile->Heat();
 }
 
 void HeatField::ComputeMiddleTheta(Tile* tile) const {
-  MiddleThetaOf(tile, material_.rc_dry, material_.rc_wet - material_.rc_dry);
+  MiddleThetaOf(tile, tile->material->rc_dry, tile->material->rc_wet - tile->material->rc_dry);
 }
 
 void HeatField::RefreshTheta(Tile* tile, Ledger* ledger) {
-  ThetaOf(tile, material_.rc_dry, material_.rc_wet - material_.rc_dry);
+  ThetaOf(tile, tile->material->rc_dry, tile->material->rc_wet - tile->material->rc_dry);
   float total = 0;
   for (const float s : tile->theta_sum) total += s;
   if (!std::isfinite(total) || tile->theta_max > kThetaPlausible || tile->theta_min < -kThetaPlausible ||

@@ -255,15 +255,15 @@ std::array<const Tile*, 9> HeatField::Around(const Tile& tile) const {
   std::array<const Tile*, 9> around{};
   for (int n = 0; n < 9; ++n) {
     const Tile* other = n == 4 ? &tile : Find(tile.tx + n % 3 - 1, tile.ty + n / 3 - 1);
-    // A face or link to a tile that sleeps is closed.
-    around[n] = other != nullptr && other->state.awake != 0 ? other : nullptr;
+    // A face or link to a tile that sleeps, or to one of another sheet, is closed.
+    around[n] = other != nullptr && other->state.awake != 0 && other->material == tile.material ? other : nullptr;
   }
   return around;
 }
 
 void HeatField::ComputeResistance(Tile* tile) {
   alignas(64) CellResistance now;
-  tile->has_front = ResistancesOf(*tile, material_, &now);
+  tile->has_front = ResistancesOf(*tile, *tile->material, &now);
   // Faces of neighbours depend on the two cells next to the border.
   std::array<bool, 9> changed{};
   const auto differs = [&](int from, int count) {
@@ -295,15 +295,16 @@ void HeatField::BuildFaces(Tile* tile) {
         Around(*tile), [part](const Tile& of, int i, int j) { return (of.resistance.*part)[ThetaIndex(i, j)]; },
         std::numeric_limits<float>::infinity(), (tile->resistance.*part).data());
   }
-  const float scale = 1.0f / (material_.cell_m * material_.cell_m);  // d / flat_volume
+  const Material& material = *tile->material;
+  const float scale = 1.0f / (material.cell_m * material.cell_m);  // d / flat_volume
   FacesOf(tile, scale);
   SmoothOf(tile);
   if (!geometry.shear.empty()) {
     tile->links.resize(geometry.shear.size());
     LinksOf(tile, scale);
   }
-  RatesOf(tile, material_.rc_dry, material_.rc_wet - material_.rc_dry,
-          std::max(material_.loss_resting, material_.loss_tented));
+  RatesOf(tile, material.rc_dry, material.rc_wet - material.rc_dry,
+          std::max(material.loss_resting, material.loss_tented));
   tile->rate = *std::max_element(tile->cell_rate.begin(), tile->cell_rate.end());
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 #include <utility>
 
 namespace fulcrum::thermal {
@@ -24,7 +25,16 @@ double Tile::Heat() const {
 }
 
 HeatField::HeatField(Sheet sheet, const Material& material)
-    : sheet_(std::move(sheet)), material_(material), tiles_(sheet_.tile_count()) {}
+    : sheet_(std::move(sheet)),
+      materials_(static_cast<std::size_t>(sheet_.materials), material),
+      tiles_(sheet_.tile_count()) {}
+
+HeatField::HeatField(Sheet sheet, std::vector<Material> materials)
+    : sheet_(std::move(sheet)), materials_(std::move(materials)), tiles_(sheet_.tile_count()) {
+  if (materials_.size() != static_cast<std::size_t>(sheet_.materials)) {
+    throw std::logic_error("HeatField: as many materials as the sheet has");
+  }
+}
 
 Tile* HeatField::Find(int tx, int ty) const {
   if (tx < 0 || ty < 0 || tx >= sheet_.tiles_x || ty >= sheet_.tiles_y) return nullptr;
@@ -36,7 +46,8 @@ Tile* HeatField::Create(int index) {
   tile->index = index;
   tile->tx = index % sheet_.tiles_x;
   tile->ty = index / sheet_.tiles_x;
-  tile->flat_volume = material_.cell_m * material_.cell_m * material_.thickness_m;
+  tile->material = &materials_[static_cast<std::size_t>(sheet_.MaterialOf(tile->tx, tile->ty))];
+  tile->flat_volume = tile->material->cell_m * tile->material->cell_m * tile->material->thickness_m;
   SetGeometry(sheet_, tile.get());
   for (int j = 0; j < kTile; ++j) {
     for (int i = 0; i < kTile; ++i) {
@@ -73,7 +84,7 @@ void HeatField::MarkNeighboursStale(const Tile& tile) {
 void HeatField::RebuildStaleFaces() {
   for (Tile* tile : awake_) {
     // Cells begin and cease to boil without a change of the material; see CellResistance.
-    const bool may_boil = tile->has_front || tile->theta_max >= kFrontTheta * material_.theta_boil;
+    const bool may_boil = tile->has_front || tile->theta_max >= kFrontTheta * tile->material->theta_boil;
     if (!std::exchange(tile->material_stale, false) && !may_boil) continue;
     tile->faces_stale = true;
     ComputeResistance(tile);
@@ -108,16 +119,17 @@ void HeatField::TakeOut(Tile* tile, int cell, CellFlag why, double* account) {
 }
 
 void HeatField::Boil(Tile* tile, Ledger* ledger) {
-  if (tile->theta_max <= material_.theta_boil) return;
+  const Material& material = *tile->material;
+  if (tile->theta_max <= material.theta_boil) return;
   TileState& s = tile->state;
   double steam = 0;
   for (int cell = 0; cell < kTileCells; ++cell) {
-    const float excess = s.enthalpy[cell] - material_.BoilingEnthalpy(s.water[cell]);
+    const float excess = s.enthalpy[cell] - material.BoilingEnthalpy(s.water[cell]);
     if (excess <= 0.0f || s.water[cell] <= 0.0f) continue;
     const float before = s.enthalpy[cell];
-    const float boiled = std::min(s.water[cell], excess / material_.latent);
+    const float boiled = std::min(s.water[cell], excess / material.latent);
     s.water[cell] -= boiled;
-    s.enthalpy[cell] = material_.BoilingEnthalpy(s.water[cell]) + (excess - boiled * material_.latent);
+    s.enthalpy[cell] = material.BoilingEnthalpy(s.water[cell]) + (excess - boiled * material.latent);
     steam += (static_cast<double>(before) - static_cast<double>(s.enthalpy[cell])) * tile->geometry.area[cell];
   }
   if (steam > 0) {
@@ -150,6 +162,7 @@ void HeatField::CollectIsland(Tile* seed) {
     const int tx = island_[n]->tx, ty = island_[n]->ty;
     for (Tile* other : {Find(tx - 1, ty), Find(tx + 1, ty), Find(tx, ty - 1), Find(tx, ty + 1)}) {
       if (other == nullptr || other->state.awake == 0 || other->substeps > 0) continue;
+      if (other->material != seed->material) continue;
       other->substeps = 1;
       island_.push_back(other);
     }
@@ -166,7 +179,8 @@ int HeatField::DiffuseIsland(float dt_s, Ledger* ledger) {
   const float needed = std::ceil(dt_s * rate / kExplicitLimit);
   const bool stiff = !(needed <= kMaxSubsteps);
   // In wet tissue the limiter must not reduce the fourth-order fluxes of waves of four cells and longer.
-  const float wet_rate = 4.0f * material_.k_wet / (material_.rc_wet * material_.cell_m * material_.cell_m);
+  const Material& material = *island_[0]->material;
+  const float wet_rate = 4.0f * material.k_wet / (material.rc_wet * material.cell_m * material.cell_m);
   const float wanted = std::max(needed, std::ceil(dt_s * kResolvedGain * wet_rate / kExplicitLimit));
   const int substeps = stiff ? kMaxSubsteps : static_cast<int>(std::clamp<float>(wanted, 1, kMaxSubsteps));
   const float h = dt_s / static_cast<float>(substeps);
@@ -200,10 +214,13 @@ int HeatField::DiffuseIsland(float dt_s, Ledger* ledger) {
 void HeatField::WakeNeighbours() {
   // Iterates over a copy: tiles that wake here are cold and wake no neighbours.
   scratch_.assign(awake_.begin(), awake_.end());
+  int material = 0;
   const auto hold = [&](int tx, int ty) {
+    if (sheet_.MaterialOf(tx, ty) != material) return;
     if (Tile* tile = Wake(tx, ty)) tile->held = true;
   };
   for (const Tile* tile : scratch_) {
+    material = sheet_.MaterialOf(tile->tx, tile->ty);
     if (tile->theta_max < kWakeTheta) continue;
     float left = 0, right = 0, up = 0, down = 0;
     for (int n = 0; n < kTile; ++n) {

@@ -45,10 +45,15 @@ void SetGeometry(const Sheet& sheet, Tile* tile);
 
 class HeatField {
  public:
+  /// One material for all sheets.
   HeatField(Sheet sheet, const Material& material);
+  /// @pre as many materials as the sheet has, which differ in thickness, conductivities and losses only.
+  HeatField(Sheet sheet, std::vector<Material> materials);
 
   [[nodiscard]] const Sheet& sheet() const { return sheet_; }
-  [[nodiscard]] const Material& material() const { return material_; }
+  /// The first one, for what all have in common; that of a place is Tile::material.
+  [[nodiscard]] const Material& material() const { return materials_[0]; }
+  [[nodiscard]] std::span<const Material> materials() const { return materials_; }
   /// Awake tiles by ascending index, so sums over them do not depend on the order of waking.
   [[nodiscard]] std::span<Tile* const> awake() const { return awake_; }
   [[nodiscard]] bool idle() const { return awake_.empty(); }
@@ -121,13 +126,13 @@ class HeatField {
   Tile* Create(int index);
   /// Sink per kelvin [W/m^3K].
   [[nodiscard]] float SinkOf(const Tile& tile) const {
-    return tile.state.tented != 0 ? material_.loss_tented : material_.loss_resting;
+    return tile.state.tented != 0 ? tile.material->loss_tented : tile.material->loss_resting;
   }
-  /// The tile and its eight neighbours, row by row; null where none is awake.
+  /// The tile and its eight neighbours, row by row; null where none of its material is awake.
   [[nodiscard]] std::array<const Tile*, 9> Around(const Tile& tile) const;
 
   Sheet sheet_;
-  Material material_;
+  std::vector<Material> materials_;
   std::vector<std::unique_ptr<Tile>> tiles_;  ///< By index; null until first use.
   std::vector<Tile*> awake_;
   std::vector<Tile*> scratch_, island_;

@@ -45,6 +45,7 @@ struct Material {
   float leak_S_m2 = 0;           ///< Leak conductance to the tissue beneath where the potential is even: sigma_fat / H.
   float fat_depth_m = 0;         ///< H.
   float spreading = kSpreading;  ///< 0: leak_S_m2 everywhere.
+  bool spanned = false;          ///< Spanned freely: air on both sides, no tissue beneath.
 
   [[nodiscard]] float HeatCapacity(float water) const { return rc_dry + water * (rc_wet - rc_dry); }
   [[nodiscard]] float ThermalConductivity(float water) const { return k_dry + water * (k_wet - k_dry); }

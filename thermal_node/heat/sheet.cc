@@ -7,6 +7,7 @@
 
 #include "services/base/core/error.h"
 #include "services/base/core/sheets.h"
+#include "thermal_node/heat/sheet_materials.h"
 
 namespace fulcrum::thermal {
 namespace {
@@ -181,6 +182,11 @@ void MeasureMetric(const SheetScene& scene, Sheet* sheet) {
 
 }  // namespace
 
+const Band* Sheet::BandOf(int material) const {
+  const auto found = std::find_if(bands.begin(), bands.end(), [=](const Band& b) { return b.material == material; });
+  return found != bands.end() ? &*found : nullptr;
+}
+
 CellIndex Sheet::CellOf(const Vec2f& material) const {
   return {static_cast<std::int32_t>(std::floor(material.x() / cell_m)) - origin_x,
           static_cast<std::int32_t>(std::floor(material.y() / cell_m)) - origin_y};
@@ -249,6 +255,7 @@ Sheet MakeSheet(const SheetScene& scene) {
     }
   }
   MeasureMetric(scene, &sheet);
+  AddMaterials(scene, &sheet);
   return sheet;
 }
 

@@ -2,6 +2,7 @@
 // membrane is one, the charts of the solids are another.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -32,6 +33,15 @@ struct SurfaceMetric {
 inline constexpr float kStretchMin = 0.5f, kStretchMax = 2.0f;
 inline constexpr int kMetricStep = 8;  ///< Spacing of the stored metric [cells].
 
+/// A sheet that is spanned freely from its first to its last row, as a rectangle in material space. What it spans holds
+/// both of these ends at 0 V; its sides are free.
+struct Band {
+  int material = 0;                  ///< Its number.
+  Vec2f low = Vec2f::Zero();         ///< Corner (s, t) [m].
+  Vec2f size = Vec2f::Zero();        ///< Width along s, length along t [m].
+  std::vector<CellIndex> ends = {};  ///< Cells of tissue along both ends, ordered.
+};
+
 struct Sheet {
   float cell_m = 1e-4f;
   std::int32_t origin_x = 0, origin_y = 0;  ///< Global index floor(s / cell_m) of cell (0, 0).
@@ -42,12 +52,29 @@ struct Sheet {
   std::vector<SurfaceMetric> metric;
   int metric_x = 0, metric_y = 0;
   std::vector<std::uint8_t> outside;  ///< Bit field over tiles_x*kTile by tiles_y*kTile: no tissue there.
+  int materials = 1;                  ///< Number of materials.
+  /// By tile the number of its material, that of the nearest tissue; empty: 0 everywhere. Neither heat nor current
+  /// passes between tiles of different materials.
+  std::vector<std::uint8_t> material_of_tile;
+  std::vector<Band> bands;
 
   [[nodiscard]] int tile_count() const { return tiles_x * tiles_y; }
   [[nodiscard]] bool Contains(CellIndex c) const { return c.ix >= 0 && c.iy >= 0 && c.ix < nx && c.iy < ny; }
   [[nodiscard]] bool IsOutside(int ix, int iy) const {
     return TestBit(outside, static_cast<std::size_t>(iy) * tiles_x * kTile + ix);
   }
+  /// Number of a tile's material; beyond the sheet 0.
+  [[nodiscard]] int MaterialOf(int tx, int ty) const {
+    const bool beyond = tx < 0 || ty < 0 || tx >= tiles_x || ty >= tiles_y;
+    return beyond || material_of_tile.empty() ? 0 : material_of_tile[static_cast<std::size_t>(ty) * tiles_x + tx];
+  }
+  /// Of the tile around a cell; beyond the sheet that of its border.
+  [[nodiscard]] int MaterialAt(CellIndex c) const {
+    return MaterialOf(std::clamp(c.ix / kTile, 0, std::max(tiles_x - 1, 0)),
+                      std::clamp(c.iy / kTile, 0, std::max(tiles_y - 1, 0)));
+  }
+  /// The band of a material; nullptr: it is none.
+  [[nodiscard]] const Band* BandOf(int material) const;
   [[nodiscard]] CellIndex CellOf(const Vec2f& material) const;
   [[nodiscard]] Vec2f CentreOf(CellIndex cell) const;
   /// Metric at a place, in cells from the sheet's origin; beyond the border that of the border.
@@ -56,8 +83,8 @@ struct Sheet {
   [[nodiscard]] bool OnSheet(const Vec2f& material) const;
 };
 
-/// Without cells for a scene without a membrane. Throws InputError when the grid is no grid, or its material
-/// coordinates are not finite or are larger than the atlas.
+/// Without cells for a scene without a membrane. Throws InputError when the grid is no grid, when its material
+/// coordinates are not finite or are larger than the atlas, or when a tile holds sheets of different materials.
 [[nodiscard]] Sheet MakeSheet(const SheetScene& scene);
 /// The charts of the solids, with cells of kSolidCell_m.
 [[nodiscard]] Sheet MakeSolidSheet(const TissueScene& scene, const SolidCharts& charts);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "thermal_node/heat/material.h"
 #include "thermal_node/heat/sheet.h"
 
 namespace fulcrum::thermal {
@@ -71,7 +72,8 @@ struct CellResistance {
 struct Tile {
   TileState state;
   int tx = 0, ty = 0, index = 0;
-  float flat_volume = 0;  ///< Volume of a cell in material space [m^3].
+  const Material* material = nullptr;  ///< Of its sheet.
+  float flat_volume = 0;               ///< Volume of a cell in material space [m^3].
   TileGeometry geometry;
 
   /// theta [K] with a halo; equals enthalpy / heat capacity at all times between calls.

@@ -115,14 +115,15 @@ void PaperModel::MoveTo(CellIndex corner) {
   corner_ = corner;
 }
 
-void PaperModel::LoadTissue(const HeatField& field) {
+void PaperModel::LoadTissue(const HeatField& field, int material) {
   const Sheet& sheet = field.sheet();
   for (int j = 0; j < kTexture; ++j) {
     const std::span<float> row = potential_.tissue_row(j);
     const int iy = corner_.iy + j;
     for (int i = 0; i < kTexture; i += kTile) {
       const int ix = corner_.ix + i;
-      const bool beyond = ix < 0 || iy < 0 || ix >= sheet.tiles_x * kTile || iy >= sheet.tiles_y * kTile;
+      const bool beyond = ix < 0 || iy < 0 || ix >= sheet.tiles_x * kTile || iy >= sheet.tiles_y * kTile ||
+                          sheet.MaterialOf(ix / kTile, iy / kTile) != material;
       const Tile* tile = beyond ? nullptr : field.Find(ix / kTile, iy / kTile);
       for (int n = 0; n < kTile; ++n) {
         bool tissue = !beyond;
@@ -151,16 +152,17 @@ void PaperModel::PlaceElectrode(const Sheet& sheet, const Electrode& electrode) 
 }
 
 void PaperModel::Heat(HeatField* field, const Electrode& electrode, float dt_s, Ledger* ledger) {
-  const Material& material = field->material();
   const Sheet& sheet = field->sheet();
   // The texture moves by whole tiles; the tip is then at least 3.5 of the 8 tiles from its border.
   const CellIndex centre = sheet.CellOf(electrode.tip);
+  const int number = sheet.MaterialAt(centre);
+  const Material& material = field->materials()[static_cast<std::size_t>(number)];
   const auto corner = [](int cell) {
     return (static_cast<int>(std::floor((static_cast<float>(cell) + 0.5f * kTile) / kTile)) - kTextureTiles / 2) *
            kTile;
   };
   MoveTo({corner(centre.ix), corner(centre.iy)});
-  LoadTissue(*field);
+  LoadTissue(*field, number);
   PlaceElectrode(sheet, electrode);
   potential_.Relax(kPaperSweeps);
   const float sheet_S = material.sigma * material.thickness_m;
@@ -174,7 +176,8 @@ void PaperModel::Heat(HeatField* field, const Electrode& electrode, float dt_s, 
     }
     for (int tx = 0; tx < kTextureTiles; ++tx) {
       const int ix = corner_.ix + tx * kTile, iy = corner_.iy + ty * kTile;
-      Tile* tile = ix >= 0 && iy >= 0 ? field->Wake(ix / kTile, iy / kTile) : nullptr;
+      const bool is_other = ix < 0 || iy < 0 || sheet.MaterialOf(ix / kTile, iy / kTile) != number;
+      Tile* tile = is_other ? nullptr : field->Wake(ix / kTile, iy / kTile);
       if (tile == nullptr) continue;
       tile->state.tented = electrode.tented ? 1 : 0;
       // The texture is flat, as in the paper; the ledger counts the heat with the areas of the curved sheet.

@@ -67,7 +67,7 @@ class PaperModel {
 
  private:
   void MoveTo(CellIndex corner);
-  void LoadTissue(const HeatField& field);
+  void LoadTissue(const HeatField& field, int material);
   void FindBorder(const Sheet& sheet);
   void PlaceElectrode(const Sheet& sheet, const Electrode& electrode);
   [[nodiscard]] CellIndex CellOfNode(Index node) const;

@@ -62,7 +62,7 @@ RemovedBox Crumbs::TakeOut(HeatField* field, const RemovedBox& changed, Ledger* 
       for (const CellIndex& cell : piece_) {
         Tile* tile = field->Wake(cell.ix / kTile, cell.iy / kTile);
         const int k = (cell.iy % kTile) * kTile + cell.ix % kTile;
-        area_m2_ += static_cast<double>(tile->flat_volume * tile->geometry.area[k] / field->material().thickness_m);
+        area_m2_ += static_cast<double>(tile->flat_volume * tile->geometry.area[k] / tile->material->thickness_m);
         field->TakeOut(tile, k, kRemoved, &ledger->debris);
         removed.Add(cell);
       }

@@ -61,27 +61,31 @@ void Cool(float* enthalpy, const float* theta, const float* decay, const float* 
   for (int i = 0; i < kTile; ++i) enthalpy[i] -= dt_s * decay[i] * (theta[i] - below[i]);
 }
 
+bool IsApart(const Tile& tile) { return tile.state.tented != 0 || tile.material->spanned; }
+
 /// True if the tile takes part in the exchange.
-bool Touches(const Tile* tile) { return tile != nullptr && tile->state.awake != 0 && tile->state.tented == 0; }
+bool Touches(const Tile* tile) { return tile != nullptr && tile->state.awake != 0 && !IsApart(*tile); }
 
 }  // namespace
 
-SheetContact::SheetContact(const Material& sheet, const VolumeMaterial& volume)
-    : sheet_material_(sheet), half_layer_(1.0f / volume.face[0]) {
-  const float largest = 1.0f / (half_layer_ + 0.5f * sheet.thickness_m / std::max(sheet.k_wet, sheet.k_dry));
-  rate_ = largest / (sheet.thickness_m * sheet.rc_dry);
+SheetContact::SheetContact(std::span<const Material> sheets, const VolumeMaterial& volume)
+    : half_layer_(1.0f / volume.face[0]) {
+  for (const Material& sheet : sheets) {
+    const float largest = 1.0f / (half_layer_ + 0.5f * sheet.thickness_m / std::max(sheet.k_wet, sheet.k_dry));
+    rate_ = std::max(rate_, largest / (sheet.thickness_m * sheet.rc_dry));
+  }
 }
 
 float SheetContact::Conductance(const Tile& tile, int cell) const {
   if ((tile.state.flags[cell] & kNoTissue) != 0) return 0;
   const float half_sheet =
-      0.5f * sheet_material_.thickness_m / sheet_material_.ThermalConductivity(tile.state.water[cell]);
+      0.5f * tile.material->thickness_m / tile.material->ThermalConductivity(tile.state.water[cell]);
   return 1.0f / (half_layer_ + half_sheet);
 }
 
 void SheetContact::Wake(HeatField* sheet, VolumeField* volume) const {
   for (const Tile* tile : sheet->awake()) {
-    if (tile->theta_max < kVolumeWakeTheta || tile->state.tented != 0) continue;
+    if (tile->theta_max < kVolumeWakeTheta || IsApart(*tile)) continue;
     int first = kTile, last = -1;
     for (int j = 0; j < kTile; ++j) {
       const float* theta = &tile->theta[ThetaIndex(0, j)];
@@ -116,7 +120,8 @@ void SheetContact::WakeSheetAbove(const Brick& brick, HeatField* sheet) const {
     if (!warm[n / kBrickTiles][n % kBrickTiles]) continue;
     const int tx = brick.bx * kBrickTiles + n % kBrickTiles, ty = brick.by * kBrickTiles + n / kBrickTiles;
     const Tile* there = sheet->Find(tx, ty);
-    if (there != nullptr && there->state.tented != 0) continue;
+    const auto material = static_cast<std::size_t>(sheet->sheet().MaterialOf(tx, ty));
+    if (sheet->materials()[material].spanned || (there != nullptr && IsApart(*there))) continue;
     if (Tile* tile = sheet->Wake(tx, ty)) tile->held = true;
   }
 }
@@ -141,8 +146,8 @@ void SheetContact::Exchange(float dt_s, HeatField* sheet, const VolumeMaterial& 
         for (int i = 0; i < kTile; ++i) {
           const int cell = row * kTile + i;
           const float g = Conductance(*tile, cell);
-          rows.flow[r][to + i] = g * tile->Volume(cell) / volume.sheet_thickness;
-          rows.decay[r][to + i] = g / volume.sheet_thickness;
+          rows.flow[r][to + i] = g * tile->Volume(cell) / tile->material->thickness_m;
+          rows.decay[r][to + i] = g / tile->material->thickness_m;
         }
       }
     }
@@ -179,7 +184,7 @@ int SheetContact::Step(float dt_s, HeatField* sheet, VolumeField* volume, Ledger
     for (Brick* brick : volume->awake()) Exchange(h, sheet, volume->material(), brick);
     ledger->lost += volume->Advance(h);
     for (Tile* tile : sheet->awake()) {
-      if (tile->state.tented == 0) sheet->RefreshTheta(tile, ledger);
+      if (!IsApart(*tile)) sheet->RefreshTheta(tile, ledger);
     }
   }
   volume->Finish(dt_s);

@@ -2,9 +2,11 @@
 //
 // Two columns lie under three cells of the sheet, along s and along t. Each pair of a cell and a column exchanges g A
 // (theta_cell - theta_column), A the area they share, g the conductance of half the sheet and half a layer in series
-// [W/m^2K]. So temperatures stay within their initial bounds and heat is conserved. There is no contact at holes and
-// where the sheet is tented.
+// [W/m^2K]. So temperatures stay within their initial bounds and heat is conserved. There is no contact at holes, where
+// the sheet is tented, and beneath a sheet that is spanned freely.
 #pragma once
+
+#include <span>
 
 #include "thermal_node/heat/heat_field.h"
 #include "thermal_node/volume/volume_field.h"
@@ -13,7 +15,8 @@ namespace fulcrum::thermal {
 
 class SheetContact {
  public:
-  explicit SheetContact(const Material& sheet, const VolumeMaterial& volume);
+  SheetContact(std::span<const Material> sheets, const VolumeMaterial& volume);
+  SheetContact(const Material& sheet, const VolumeMaterial& volume) : SheetContact(std::span(&sheet, 1), volume) {}
 
   /// One step of the volume with its contact to the sheet, in substeps that the larger rate of both requires. The heat
   /// conducted downward is booked as lost in the sheet's ledger. Returns the number of substeps; 0 if all is cold.
@@ -28,7 +31,6 @@ class SheetContact {
   /// g of a cell of the sheet [W/m^2K].
   [[nodiscard]] float Conductance(const Tile& tile, int cell) const;
 
-  const Material& sheet_material_;
   float half_layer_ = 0;  ///< Resistance of half a layer of the volume [m^2K/W].
   float rate_ = 0;        ///< Largest rate of the exchange for a cell of the sheet [1/s].
 };

@@ -24,7 +24,6 @@ VolumeMaterial MakeVolumeMaterial(const ThermalParams& p) {
   const bool ends_inside = p.fat_depth_m < m.depth_m();
   const float heated_m = ends_inside ? static_cast<float>(m.fat_layers) * m.pitch_m : p.fat_depth_m;
   m.source_per_V2 = p.sigma_fat_S_m / (p.fat_depth_m * heated_m);
-  m.sheet_thickness = p.thickness_m;
   return m;
 }
 

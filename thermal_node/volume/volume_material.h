@@ -29,9 +29,8 @@ struct VolumeMaterial {
   /// Conductance per area between layer k - 1 and layer k [W/m^2K]; [0]: from the upper face to the middle of layer 0;
   /// [kLayers]: 0, nothing leaves below.
   std::array<float, kLayers + 1> face{};
-  float perfusion = 0;        ///< Sink per kelvin [W/m^3K].
-  float source_per_V2 = 0;    ///< Heat of the leak current in fat over the square of the potential above [W/(m^3 V^2)].
-  float sheet_thickness = 0;  ///< [m]
+  float perfusion = 0;      ///< Sink per kelvin [W/m^3K].
+  float source_per_V2 = 0;  ///< Heat of the leak current in fat over the square of the potential above [W/(m^3 V^2)].
 
   [[nodiscard]] float depth_m() const { return pitch_m * kLayers; }
 };

@@ -27,6 +27,7 @@ int main(int argc, char** argv) {
   fulcrum::thermal::CutCases(&report);
   fulcrum::thermal::HeatCases(&report);
   fulcrum::thermal::PotentialCases(&report);
+  fulcrum::thermal::SheetsCases(&report);
   fulcrum::thermal::PublishedCases(&report);
   fulcrum::thermal::BenchmarkVolume(&report);
   fulcrum::thermal::WorkPrecision(&report);

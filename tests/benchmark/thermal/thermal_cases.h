@@ -21,6 +21,8 @@ void PotentialCases(benchmark::Report* report);
 void NodeCases(benchmark::Report* report);
 /// Shape of cuts by speed and mode, and the error of the coupling step.
 void CutCases(benchmark::Report* report);
+/// Sheets with a thickness and a support of their own.
+void SheetsCases(benchmark::Report* report);
 /// Published measurements and bounds by energy.
 void PublishedCases(benchmark::Report* report);
 

@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 
+#include "services/base/core/sheets.h"
+
 namespace fulcrum::thermal {
 namespace {
 
@@ -21,7 +23,7 @@ bool IsRemoved(const HeatField& field, CellIndex cell) {
 }
 
 TopologyValidator::TopologyValidator(const SceneView& scene, const Sheet& sheet)
-    : nodes_(scene.membrane_material.size()) {
+    : nodes_(scene.membrane_material.size()), absent_(AbsentNodes(scene)) {
   const Vec2f origin(static_cast<float>(sheet.origin_x), static_cast<float>(sheet.origin_y));
   for (const Vec2f& p : scene.membrane_material) node_.push_back(p / sheet.cell_m - origin);
   const Index cols = scene.membrane.cols;
@@ -159,6 +161,7 @@ std::string TopologyValidator::Check(const MeshTopology& topology, const HeatFie
     if (!TestBit(bits.dead_edges, e)) attached[edge.a] = attached[edge.b] = true;
   }
   for (Index node = 0; node < nodes_; ++node) {
+    if (absent_[node] != 0) continue;
     if (std::string fault = CheckNode(node, attached[node], bits, field); !fault.empty()) return fault;
   }
   std::string fault = CheckHistory(topology);

@@ -44,9 +44,10 @@ class TopologyValidator {
   [[nodiscard]] CellIndex CellOfNode(Index node, const Sheet& sheet) const;
 
   std::size_t nodes_;
-  std::vector<Edge> edges_;  ///< Existing edges.
-  std::vector<Vec2f> node_;  ///< Positions in cells from the sheet's origin.
-  std::vector<bool> hole_;   ///< Per tile, at the present Check().
+  std::vector<std::uint8_t> absent_;  ///< By node: 1 where it belongs to no sheet; those are not checked.
+  std::vector<Edge> edges_;           ///< Existing edges.
+  std::vector<Vec2f> node_;           ///< Positions in cells from the sheet's origin.
+  std::vector<bool> hole_;            ///< Per tile, at the present Check().
   TopologyBits last_;
   std::uint64_t last_revision_ = 0;
 };
