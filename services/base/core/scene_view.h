@@ -193,8 +193,8 @@ struct Attachment {
   Triangle surface;
   std::array<float, 3> barycentric;
   float stiffness_N_per_m;
-  /// Zero: glued, the same stiffness in every direction. Else the unit normal in W of the plane in which the two slide:
-  /// the spring acts along it only.
+  /// Zero: glued, the same stiffness in every direction. Else the two slide, and the spring acts along the normal of
+  /// the surface, from its point nearest to the vertex: this unit vector in W at rest, on the outer side of `surface`.
   Vec3f normal = Vec3f::Zero();
 };
 

@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <sstream>
 
 #include "services/base/core/error.h"
 #include "services/base/core/scope.h"
 #include "services/base/core/sheets.h"
-#include "services/base/core/solids.h"
+#include "services/scene/builder/attachments.h"
 #include "services/scene/builder/build.h"
 #include "services/scene/builder/geometry.h"
 #include "services/scene/builder/sheets.h"
@@ -147,52 +146,6 @@ std::vector<Vec3d> AddSolids(const Anatomy& anatomy, bool has_organ, SceneData* 
     if (is_listed) scene->solids.push_back(solid);
   }
   return vertices;
-}
-
-/// Springs from every vertex of a body's surface to the nearest point of another one within reach: a column of tissue
-/// over the vertex's share of the surface, as long as the distance.
-void AddAttachments(const SceneSettings& settings, const Anatomy& anatomy, const std::vector<Vec3d>& vertices,
-                    SceneData* scene) {
-  constexpr double kLeastLength_m = 1e-3;  // Of the column, where bodies touch.
-  constexpr double kStiffest_N_per_m = 1e5;
-  if (!settings.attach.empty() && settings.physics.mode != PhysicsMode::kAccurate) {
-    Refuse(settings, "attach: only `physics.mode: accurate` has attachments");
-  }
-  const std::vector<Index> solid = SolidOfVertices(scene->View());
-  const auto find = [&](const std::string& name) {
-    const auto at = std::ranges::find(anatomy.solids, name, &SolidBody::name);
-    if (at == anatomy.solids.end()) Refuse(settings, "attach: no body '" + name + "'");
-    return static_cast<Index>(at - anatomy.solids.begin());
-  };
-  for (const AttachSettings& attach : settings.attach) {
-    const Index from = find(attach.from), to = find(attach.to);
-    std::vector<Triangle> surface;
-    std::vector<double> area(vertices.size());
-    for (const Triangle& t : scene->tube_surface) {
-      if (solid[t[0]] == to) surface.push_back(t);
-      if (solid[t[0]] != from) continue;
-      const Vec3d &a = vertices[t[0]], &b = vertices[t[1]], &c = vertices[t[2]];
-      for (const Index v : t) area[v] += (b - a).cross(c - a).norm() / 6;
-    }
-    const std::size_t before = scene->attachments.size();
-    const TriangleLocator locator(vertices, surface);
-    for (Index v = 0; v < vertices.size(); ++v) {
-      if (!(area[v] > 0)) continue;
-      const auto hit = locator.Closest(vertices[v], attach.reach_m);
-      if (hit.triangle == kNoIndex) continue;
-      Attachment a{v, surface[hit.triangle], {}, 0};
-      for (int k = 0; k < 3; ++k) a.barycentric[k] = static_cast<float>(hit.closest.barycentric[k]);
-      const double stiffness = attach.youngs_modulus_Pa * area[v] / std::max(hit.closest.distance, kLeastLength_m);
-      a.stiffness_N_per_m = static_cast<float>(std::min(stiffness, kStiffest_N_per_m));
-      scene->attachments.push_back(a);
-    }
-    if (scene->attachments.size() == before) {
-      std::ostringstream text;
-      text << "attach: no vertex of '" << attach.from << "' lies within " << 1e3 * attach.reach_m << " mm of '"
-           << attach.to << "'; raise reach_mm, or move the bodies";
-      Refuse(settings, text.str());
-    }
-  }
 }
 
 void AddSurroundings(const Anatomy& anatomy, SceneData* scene) {

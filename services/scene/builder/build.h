@@ -41,6 +41,9 @@ struct Anatomy {
   std::vector<SolidBody> solids;  ///< The first is the organ under the membrane, if there is one.
   std::vector<SheetBody> sheets;  ///< The first is the membrane, if there is an organ.
   bool is_patch = false;          ///< The sheet covers a patch, not a stretch of a tube.
+  /// Frame W in the frame of the description's bodies: p_W = R_WF (p_F - origin_m).
+  Mat3d R_WF = Mat3d::Identity();
+  Vec3d origin_m = Vec3d::Zero();
   struct Surrounding {
     std::string name;
     SurfaceRole role;

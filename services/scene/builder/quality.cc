@@ -198,11 +198,26 @@ std::string Describe(const SceneView& s, const SceneQuality& q) {
   for (std::size_t v = 0; v < solid_of.size() && !s.solids.empty(); ++v) {
     if (s.inverse_mass[v] == 0) is_loose[solid_of[v]] = false;
   }
-  for (const Attachment& a : s.attachments) is_loose[solid_of[a.vertex]] = is_loose[solid_of[a.surface[0]]] = false;
-  for (std::size_t i = 0; i < s.solids.size(); ++i) {
-    if (is_loose[i]) add("  loose      %s: neither held nor attached, so gravity lets it fall", s.solids[i].name);
+  std::vector<bool> slides(s.solids.size(), false);
+  std::size_t sliding = 0;
+  for (const Attachment& a : s.attachments) {
+    if (!a.normal.isZero(0.0f)) {
+      slides[solid_of[a.vertex]] = slides[solid_of[a.surface[0]]] = true;
+      ++sliding;
+    } else {
+      is_loose[solid_of[a.vertex]] = is_loose[solid_of[a.surface[0]]] = false;
+    }
   }
-  if (!s.attachments.empty()) add("  attached   by %zu springs", s.attachments.size());
+  for (std::size_t i = 0; i < s.solids.size(); ++i) {
+    if (!is_loose[i]) continue;
+    add(slides[i] ? "  loose      %s: only slides on others, so it can move away along them"
+                  : "  loose      %s: neither held nor attached, so gravity lets it fall",
+        s.solids[i].name);
+  }
+  if (!s.attachments.empty()) {
+    add("  attached   by %zu springs%s", s.attachments.size(),
+        sliding > 0 ? (", " + std::to_string(sliding) + " of them sliding").c_str() : "");
+  }
   add("  stretch    %zu: organ %zu, membrane %zu (and %zu bindings)", q.organ_springs + q.membrane_springs,
       q.organ_springs, q.membrane_springs, q.bindings);
   add("  volume     %zu tetrahedra, %.1f ml", q.tets, 1e6 * q.organ_volume_m3);

@@ -119,11 +119,25 @@ struct BodySettings {
   bool first_end_held = false, last_end_held = false;  ///< Of a tube.
 };
 
+enum class AttachKind { kGlued, kSliding };
+
 /// Where two bodies are nearer than `reach_m` they are joined by tissue.
 struct AttachSettings {
   std::string from, to;  ///< Names of bodies; `organ` is the one under the membrane.
   double reach_m = 0.004;
   double youngs_modulus_Pa = 3e3;
+  AttachKind kind = AttachKind::kGlued;
+  /// Names of regions: only what is in them is joined; empty: anywhere.
+  std::string from_region = {}, to_region = {};
+};
+
+/// A named part of space, in the frame of the bodies: a box or an ellipsoid.
+struct RegionSettings {
+  std::string name;
+  bool is_box = false;
+  Vec3f half_m = Vec3f::Zero();    ///< Half of each side, or the semi-axes.
+  Vec3f at_m = Vec3f::Zero();      ///< Middle.
+  Vec3f turn_rad = Vec3f::Zero();  ///< About x, then y, then z.
 };
 
 /// The membrane's dynamic layer. Columns run across the organ (coordinate s, +x), rows along it (coordinate t, +y).
@@ -204,6 +218,7 @@ struct SceneSettings {
   std::vector<BodySettings> bodies;
   std::vector<FixedSettings> fixed;
   std::vector<AttachSettings> attach;
+  std::vector<RegionSettings> regions;
   MembraneSettings membrane;
   std::vector<SheetSettings> sheets;
   std::vector<StructureSettings> structures;

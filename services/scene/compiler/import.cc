@@ -165,6 +165,8 @@ Anatomy ImportAnatomy(const SceneSettings& described, const Progress& progress) 
   }
   Anatomy anatomy;
   anatomy.is_patch = placement.patch_width_m > 0;
+  anatomy.R_WF = placement.R_WF;
+  anatomy.origin_m = import.origin_m.cast<double>() + placement.origin_m;
   anatomy.sheets.push_back(MembraneOf(settings, std::move(membrane.nodes)));
   SolidBody organ = OrganOf(settings);
   organ.fixed = std::move(membrane.organ_fixed);

@@ -16,7 +16,7 @@ using config::Range;
 using config::StrictMap;
 
 constexpr std::size_t kMostLinePoints = 64;
-constexpr std::size_t kMostAttachments = 400;
+constexpr std::size_t kMostAttachments = 400, kMostRegions = 100;
 constexpr double kLeastDensity_kg_m2 = 0.01;
 constexpr float kLeastStep_m = 1e-4f;              ///< Between two points of a line.
 constexpr int kBendingRows = 4, kBendingCols = 7;  ///< Largest strides of the hinges, as of the built-in membrane.
@@ -208,6 +208,57 @@ SheetSettings ReadSheet(StrictMap map, const MaterialLibrary& materials) {
   return sheet;
 }
 
+const StrictMap::Choices<AttachKind> kAttachKinds = {{"glued", AttachKind::kGlued}, {"sliding", AttachKind::kSliding}};
+
+Vec3f ReadTurn(StrictMap* map) {
+  const std::vector<double> turn = map->NumbersSi("turn_deg", {0, 0, 0}, 3, 3, Range::Between(-180, 180));
+  return Eigen::Vector3d(turn[0], turn[1], turn[2]).cast<float>();
+}
+
+void ReadRegions(StrictMap* root, SceneSettings* scene) {
+  std::set<std::string> names;
+  for (StrictMap& entry : root->Maps("regions", 0, kMostRegions)) {
+    RegionSettings region;
+    region.name = entry.Text("name", 31);
+    TakeName(entry, region.name, &names);
+    region.is_box = entry.Has("box_mm");
+    if (region.is_box == entry.Has("ellipsoid_mm")) {
+      entry.Fail("name", "needs either `box_mm` (lengths of its sides) or `ellipsoid_mm` (semi-axes)");
+    }
+    region.half_m = region.is_box ? Vec3f(0.5f * entry.Vector3Si("box_mm", Range::Between(0.1, 2000)))
+                                  : entry.Vector3Si("ellipsoid_mm", Range::Between(0.1, 1000));
+    region.at_m = entry.Vector3Si("at_mm", region.at_m, Range::Between(-5000, 5000));
+    region.turn_rad = ReadTurn(&entry);
+    scene->regions.push_back(region);
+  }
+}
+
+AttachSettings ReadAttach(StrictMap* entry, const std::set<std::string>& bodies, const std::string& organ,
+                          const std::vector<RegionSettings>& regions) {
+  AttachSettings attach;
+  attach.from = entry->Text("from", 31);
+  attach.to = entry->Text("to", 31);
+  for (const auto& [key, name] : {std::pair{"from", attach.from}, std::pair{"to", attach.to}}) {
+    if (bodies.contains(name)) continue;
+    entry->Fail(key, std::string("'").append(name).append("' is no body of this scene").append(organ));
+  }
+  if (attach.from == attach.to) entry->Fail("to", "must be another body");
+  ReadSi(entry, "reach_mm", Range::Between(0.1, 50), &attach.reach_m);
+  ReadSi(entry, "youngs_modulus_kPa", Range::Between(0.001, 1e4), &attach.youngs_modulus_Pa);
+  attach.kind = entry->Choice("kind", attach.kind, kAttachKinds);
+  const auto region = [&](const char* key) {
+    const std::string name = entry->TextOr(key, "", 31);
+    if (name.empty() || std::ranges::find(regions, name, &RegionSettings::name) != regions.end()) return name;
+    std::string known;
+    for (const RegionSettings& r : regions) known += (known.empty() ? "; those of `regions`: " : ", ") + r.name;
+    entry->Fail(key,
+                "'" + name + "' is no region of this scene" + (known.empty() ? ", which has no `regions`" : known));
+  };
+  attach.from_region = region("from_region");
+  attach.to_region = region("to_region");
+  return attach;
+}
+
 }  // namespace
 
 std::vector<Vec3f> ReadLine(StrictMap* map) {
@@ -232,8 +283,7 @@ ShapeSettings ReadShape(StrictMap map) {
   }
   shape.radii_m = map.Vector3Si("ellipsoid_mm", Range::Between(1, 500));
   shape.at_m = map.Vector3Si("at_mm", shape.at_m, Range::Between(-5000, 5000));
-  const std::vector<double> turn = map.NumbersSi("turn_deg", {0, 0, 0}, 3, 3, Range::Between(-180, 180));
-  shape.turn_rad = Eigen::Vector3d(turn[0], turn[1], turn[2]).cast<float>();
+  shape.turn_rad = ReadTurn(&map);
   return shape;
 }
 
@@ -266,18 +316,9 @@ std::vector<StrictMap> ReadBodies(StrictMap* root, const FindMesh& find, const M
     if (sheet.name == "membrane") entry.Fail("name", "`membrane` is the name of the sheet over the organ");
     TakeName(entry, sheet.name, &names);
   }
+  ReadRegions(root, scene);
   for (StrictMap& entry : root->Maps("attach", 0, kMostAttachments)) {
-    AttachSettings attach;
-    attach.from = entry.Text("from", 31);
-    attach.to = entry.Text("to", 31);
-    for (const auto& [key, name] : {std::pair{"from", attach.from}, std::pair{"to", attach.to}}) {
-      if (bodies.contains(name)) continue;
-      entry.Fail(key, std::string("'").append(name).append("' is no body of this scene").append(organ));
-    }
-    if (attach.from == attach.to) entry.Fail("to", "must be another body");
-    ReadSi(&entry, "reach_mm", Range::Between(0.1, 50), &attach.reach_m);
-    ReadSi(&entry, "youngs_modulus_kPa", Range::Between(0.001, 1e4), &attach.youngs_modulus_Pa);
-    scene->attach.push_back(attach);
+    scene->attach.push_back(ReadAttach(&entry, bodies, organ, scene->regions));
   }
   if (scene->import) {
     for (const FixedSettings& surface : scene->import->surroundings) names.insert(surface.name);

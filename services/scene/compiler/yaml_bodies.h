@@ -1,4 +1,5 @@
-// Reading the deformable bodies and sheets of a scene description: shapes, `bodies`, `sheets`, `attach`, `fixed`.
+// Reading the deformable bodies and sheets of a scene description: shapes, `bodies`, `sheets`, `regions`, `attach`,
+// `fixed`.
 #pragma once
 
 #include <filesystem>
@@ -32,7 +33,7 @@ using FindMesh = std::function<std::filesystem::path(const config::StrictMap&, c
 /// What every fixed surface has: `name`, `role`, `offset_mm`, `triangles_max`, `collides`.
 FixedSettings ReadFixedSurface(config::StrictMap* map);
 
-/// `bodies`, `sheets`, `attach` and `fixed` of a description, whose organ is known.
+/// `bodies`, `sheets`, `regions`, `attach` and `fixed` of a description, whose organ is known.
 /// @return the maps of the sheets, for what depends on later sections.
 std::vector<config::StrictMap> ReadBodies(config::StrictMap* root, const FindMesh& find,
                                           const MaterialLibrary& materials, SceneSettings* scene);

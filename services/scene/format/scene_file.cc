@@ -144,15 +144,36 @@ struct Payload {
 
 }  // namespace
 
+void AddToHash(std::span<const Attachment> attachments, Hash64* hash) {
+  constexpr std::size_t kGlued_B = offsetof(Attachment, normal);
+  std::vector<std::byte> glued;
+  std::vector<Vec3f> normals;
+  bool slides = false;
+  for (const Attachment& a : attachments) {
+    const auto bytes = std::as_bytes(std::span(&a, 1)).first(kGlued_B);
+    glued.insert(glued.end(), bytes.begin(), bytes.end());
+    normals.push_back(a.normal);
+    slides = slides || !a.normal.isZero(0.0f);
+  }
+  hash->Add(std::span<const std::byte>(glued));
+  if (slides) hash->Add(std::as_bytes(std::span<const Vec3f>(normals)));
+}
+
 std::uint64_t ContentHash(const SceneView& view) {
   Hash64 hash;
   hash.AddValue(kSceneContentVersion);
   const FixedPart fixed = ToFixed(view);
   hash.Add(std::as_bytes(std::span(&fixed, 1)));
-  const auto add = [&](const char*, auto& span) { hash.Add(std::as_bytes(span)); };
+  const auto add = [&]<class T>(const char*, std::span<const T> span) {
+    if constexpr (std::is_same_v<T, Attachment>) {
+      AddToHash(span, &hash);
+    } else {
+      hash.Add(std::as_bytes(span));
+    }
+  };
   ForEachUsualSection(view, add);
   // A scene without them keeps the hash that it had before there were any.
-  ForEachBodySection(view, [&](const char* name, auto& span) {
+  ForEachBodySection(view, [&]<class T>(const char* name, std::span<const T> span) {
     if (!span.empty()) add(name, span);
   });
   if (HasStereo(view)) hash.Add(std::as_bytes(std::span(&view.stereo, 1)));

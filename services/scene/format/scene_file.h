@@ -4,9 +4,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "services/base/core/hash.h"
 #include "services/base/core/scene_view.h"
 
 namespace fulcrum::scene {
@@ -52,6 +54,8 @@ struct SceneData {
 
 /// Hash of everything except the source text: for nodes, two scenes with the same hash are the same.
 [[nodiscard]] std::uint64_t ContentHash(const SceneView& view);
+/// What it takes of attachments: normals only if there are any, so that scenes without keep their hash.
+void AddToHash(std::span<const Attachment> attachments, Hash64* hash);
 
 /// Checks the scene and writes it atomically (temporary file, then rename). Returns the content hash.
 /// Throws InputError.

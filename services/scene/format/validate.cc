@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <set>
 
 #include "services/base/core/sheet_heat.h"
 #include "services/base/core/sheets.h"
@@ -238,6 +239,8 @@ void CheckSurfaces(const SceneView& s) {
   }
 }
 
+constexpr float kUnitTolerance = 1e-3f;  ///< Rounding of a normal's length.
+
 /// Each element within one solid, each solid a range after the last one.
 void CheckSolids(const SceneView& s) {
   if (s.solids.empty() && s.attachments.empty()) return;
@@ -287,6 +290,7 @@ void CheckSolids(const SceneView& s) {
       for (const Index v : s.surface_triangles[t]) CheckIndex("surface_triangles", t, v, first, end);
     }
   }
+  std::set<Triangle> surface;
   for (std::size_t i = 0; i < s.attachments.size(); ++i) {
     const Attachment& a = s.attachments[i];
     CheckIndex("attachments", i, a.vertex, 0, s.tube_vertex_count);
@@ -296,6 +300,11 @@ void CheckSolids(const SceneView& s) {
     if (of[a.vertex] == of[a.surface[0]]) Fail("attachments", "element ", i, ": joins a solid with itself");
     CheckWeights("attachments", i, a.barycentric);
     CheckRange("attachments", "stiffness", i, a.stiffness_N_per_m, 0, 1e6);
+    if (a.normal.isZero(0.0f)) continue;
+    // What slides names a triangle of the surface.
+    CheckRange("attachments", "length of the normal", i, a.normal.norm(), 1 - kUnitTolerance, 1 + kUnitTolerance);
+    if (surface.empty()) surface.insert(s.tube_surface.begin(), s.tube_surface.end());
+    if (!surface.contains(a.surface)) Fail("attachments", "element ", i, ": slides on no triangle of tube_surface");
   }
   if (!s.attachments.empty() && s.physics.mode != PhysicsMode::kAccurate) {
     Fail("attachments", s.attachments.size(), " of them; only mode accurate has any");

@@ -66,8 +66,16 @@ void Reseal(Bytes* file) {
   content.Add(named("scene"));
   SceneView view;
   scene::ForEachUsualSection(view, [&](const char* name, auto&) { content.Add(named(name)); });
-  scene::ForEachBodySection(view, [&](const char* name, auto&) {
-    if (!named(name).empty()) content.Add(named(name));
+  scene::ForEachBodySection(view, [&]<class T>(const char* name, std::span<const T>&) {
+    const std::span<const std::byte> bytes = named(name);
+    if (bytes.empty()) return;
+    if constexpr (std::is_same_v<T, Attachment>) {
+      std::vector<Attachment> attachments(bytes.size() / sizeof(Attachment));
+      std::memcpy(static_cast<void*>(attachments.data()), bytes.data(), attachments.size() * sizeof(Attachment));
+      scene::AddToHash(attachments, &content);
+    } else {
+      content.Add(bytes);
+    }
   });
   if (!named("stereo").empty()) content.Add(named("stereo"));
   for (const Section& section : sections) {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -89,6 +90,108 @@ TEST(Bodies, AreWrittenAndReadAgain) {
   other.solids[1].youngs_modulus_Pa *= 2;
   EXPECT_NE(ContentHash(other.View()), hash);
   std::filesystem::remove(file);
+}
+
+/// Two flat blocks beside the organ, one lying on the other, with these further lines.
+std::string Stacked(const std::string& attach) {
+  return "bodies:\n"
+         "  - {name: below, material: liver, tet_edge_mm: 6, held_side: [0, 0, -1],\n"
+         "     shape: {ellipsoid_mm: [30, 25, 10], at_mm: [0, 0, 60]}}\n"
+         "  - {name: above, material: bowel, tet_edge_mm: 6, held_side: [0, 0, 1],\n"
+         "     shape: {ellipsoid_mm: [20, 20, 8], at_mm: [0, 0, 79]}}\n"
+         "regions:\n"
+         "  - {name: left, box_mm: [20, 60, 60], at_mm: [-10, 0, 70]}\n"
+         "  - {name: far, ellipsoid_mm: [5, 5, 5], at_mm: [0, 0, 120]}\n"
+         "  - {name: turned, box_mm: [60, 20, 60], at_mm: [-10, 0, 70], turn_deg: [0, 0, 90]}\n" +
+         attach;
+}
+
+TEST(Attachments, AreGluedUnlessTheySlide) {
+  const std::string pair = "{from: above, to: below, reach_mm: 5";
+  const SceneData glued = BuildScene(SmallWith(Stacked("attach: [" + pair + "}]\n")), {});
+  const SceneData named = BuildScene(SmallWith(Stacked("attach: [" + pair + ", kind: glued}]\n")), {});
+  const SceneData sliding = BuildScene(SmallWith(Stacked("attach: [" + pair + ", kind: sliding}]\n")), {});
+  EXPECT_EQ(glued.fixed.hash, named.fixed.hash);
+  EXPECT_NE(glued.fixed.hash, sliding.fixed.hash);
+  EXPECT_FALSE(FindFault(sliding.View()));
+  ASSERT_GT(sliding.attachments.size(), 3u);
+  EXPECT_LE(sliding.attachments.size(), glued.attachments.size());
+  for (const Attachment& a : glued.attachments) EXPECT_TRUE(a.normal.isZero(0.0f));
+  for (const Attachment& a : sliding.attachments) {
+    EXPECT_NEAR(a.normal.norm(), 1, 1e-6);
+    EXPECT_GT(a.normal.z(), 0.6f);
+    const auto at = std::ranges::find(glued.attachments, a.vertex, &Attachment::vertex);
+    ASSERT_NE(at, glued.attachments.end());
+    EXPECT_EQ(at->surface, a.surface);
+    EXPECT_EQ(at->stiffness_N_per_m, a.stiffness_N_per_m);
+  }
+}
+
+TEST(Attachments, GluedOnesAreHashedWithoutTheirNormals) {
+  const std::string pair = "{from: above, to: below, reach_mm: 5";
+  const SceneData glued = BuildScene(SmallWith(Stacked("attach: [" + pair + "}]\n")), {});
+  std::vector<std::byte> bytes;  // As of a scene file before version 16.
+  for (const Attachment& a : glued.attachments) {
+    const auto of = std::as_bytes(std::span(&a, 1)).first(32);
+    bytes.insert(bytes.end(), of.begin(), of.end());
+  }
+  Hash64 before, now;
+  before.Add(std::span<const std::byte>(bytes));
+  AddToHash(glued.attachments, &now);
+  EXPECT_EQ(now.value(), before.value());
+}
+
+TEST(Attachments, StayWithinARegion) {
+  const auto of = [](const std::string& more) {
+    return BuildScene(SmallWith(Stacked("attach: [{from: above, to: below, reach_mm: 5" + more + "}]\n")), {});
+  };
+  const SceneData all = of(""), from = of(", from_region: left"), to = of(", to_region: left"),
+                  turned = of(", from_region: turned");
+  const auto left_of = [](const SceneData& scene) {
+    return std::ranges::count_if(scene.attachments,
+                                 [&](const Attachment& a) { return scene.rest_position[a.vertex].x() <= 0; });
+  };
+  EXPECT_GT(left_of(all), 3);
+  EXPECT_LT(left_of(all), std::ssize(all.attachments));
+  EXPECT_EQ(std::ssize(from.attachments), left_of(all));
+  EXPECT_EQ(left_of(from), left_of(all));
+  EXPECT_EQ(turned.fixed.hash, from.fixed.hash);
+  for (const Attachment& a : to.attachments) {
+    EXPECT_TRUE(std::ranges::any_of(a.surface, [&](Index v) { return to.rest_position[v].x() <= 1e-6f; }));
+  }
+}
+
+TEST(Attachments, BadOnesAreRefusedWithWhatIsNear) {
+  const auto refusal = [](const std::string& entry) { return RefusalOf(Stacked("attach: [" + entry + "]\n")); };
+  const auto expect = [](const std::string& text, std::initializer_list<const char*> parts) {
+    for (const char* part : parts) EXPECT_NE(text.find(part), std::string::npos) << text;
+  };
+  expect(refusal("{from: above, to: below, kind: fat}"), {"kind", "glued", "sliding"});
+  expect(refusal("{from: above, to: below, from_region: right}"), {"from_region", "'right'", "left, far, turned"});
+  expect(refusal("{from: above, to: below, from_region: far}"), {"'above' lies in region 'far'", "mm outside, at"});
+  expect(refusal("{from: above, to: below, to_region: far}"), {"'below' lies in region 'far'", "mm outside, at"});
+  expect(refusal("{from: above, to: below, reach_mm: 0.1}"),
+         {"within 0.1 mm", "the nearest, at", "mm away", "reach_mm"});
+  expect(RefusalOf("regions: [{name: a}]\n"), {"box_mm", "ellipsoid_mm"});
+  expect(RefusalOf("regions: [{name: a, box_mm: [1, 1, 0]}]\n"), {"box_mm", "0.1"});
+  expect(RefusalOf("regions: [{name: a, box_mm: [1, 1, 1]}, {name: a, box_mm: [1, 1, 1]}]\n"), {"'a' is there twice"});
+}
+
+TEST(Attachments, FaultsOfSlidingOnesAreFound) {
+  const SceneData good =
+      BuildScene(SmallWith(Stacked("attach: [{from: above, to: below, reach_mm: 5, kind: sliding}]\n")), {});
+  const std::vector<std::function<void(Attachment&)>> faults = {
+      [](Attachment& a) { a.normal *= 2; },
+      [](Attachment& a) { a.normal.x() = NAN; },
+      [](Attachment& a) { std::swap(a.surface[0], a.surface[1]); },
+  };
+  for (std::size_t i = 0; i < faults.size(); ++i) {
+    SceneData bad = good;
+    faults[i](bad.attachments[0]);
+    const auto fault = FindFault(bad.View());
+    ASSERT_TRUE(fault) << i;
+    EXPECT_EQ(fault->section, "attachments") << fault->reason;
+  }
 }
 
 TEST(Bodies, OneOrganNeedsNoList) {
