@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <map>
 
 #include "services/base/core/sheets.h"
 #include "services/base/core/solids.h"
@@ -180,8 +182,48 @@ void AddBindings(const TissueScene& scene, ElasticModel* model) {
   }
 }
 
+/// The surface of a solid that something slides on: its triangles in ElasticModel::slide_surface.
+struct SlideSurface {
+  Index first = 0, end = 0;
+};
+
+std::map<Index, SlideSurface> AddSlideSurfaces(const TissueScene& scene, const std::vector<Index>& solid,
+                                               ElasticModel* model) {
+  std::map<Index, SlideSurface> surfaces;
+  for (const Attachment& a : scene.attachments) {
+    if (!a.normal.isZero(0.0f)) surfaces.try_emplace(solid[a.surface[0]]);
+  }
+  for (auto& [of, surface] : surfaces) {
+    surface.first = static_cast<Index>(model->slide_surface.size());
+    std::copy_if(scene.tube_surface.begin(), scene.tube_surface.end(), std::back_inserter(model->slide_surface),
+                 [&, wanted = of](const Triangle& t) { return solid[t[0]] == wanted; });
+    surface.end = static_cast<Index>(model->slide_surface.size());
+  }
+  return surfaces;
+}
+
+void AddSlide(const TissueScene& scene, const Attachment& attachment, const SlideSurface& surface,
+              ElasticModel* model) {
+  Vec3d from_surface = Rest(scene, attachment.vertex);
+  for (std::size_t i = 0; i < 3; ++i) {
+    from_surface -= static_cast<double>(attachment.barycentric[i]) * Rest(scene, attachment.surface[i]);
+  }
+  const auto begin = model->slide_surface.begin();
+  const auto at = std::find(begin + surface.first, begin + surface.end, attachment.surface);
+  // The normal leads to the side on which the gap is positive.
+  const double gap_m = std::copysign(from_surface.norm(), attachment.normal.cast<double>().dot(from_surface));
+  model->slides.push_back({attachment.vertex, surface.first, surface.end, static_cast<Index>(at - begin), gap_m,
+                           attachment.stiffness_N_per_m, attachment.normal.cast<double>()});
+}
+
 void AddAttachments(const TissueScene& scene, ElasticModel* model) {
+  const std::vector<Index> solid = SolidOfVertices(scene);
+  const std::map<Index, SlideSurface> slide_surfaces = AddSlideSurfaces(scene, solid, model);
   for (const Attachment& attachment : scene.attachments) {
+    if (!attachment.normal.isZero(0.0f)) {
+      AddSlide(scene, attachment, slide_surfaces.at(solid[attachment.surface[0]]), model);
+      continue;
+    }
     const Triangle& s = attachment.surface;
     const std::array<float, 3>& b = attachment.barycentric;
     ElasticHinge& hinge = model->attachments.emplace_back();

@@ -7,6 +7,7 @@
 //        + organ: nodal patches, see below                                              (tet_energy.h)
 //        + sum bindings k / 2 (|x_m - sum_i b_i x_i| - d)^2                              (eq. 9 of the paper)
 //        + sum attachments, the same energy as a hinge's                               (between solids)
+//        + sum slides   k / 2 (g - g0)^2,   g = distance of x_v from a surface         (between solids)
 //
 // Model continuum: a triangle whose three edges exist carries the sheet, and its edges have no springs of their own. A
 // triangle that a cut has opened is not a continuum any more: its edges that are left act as springs, each with the
@@ -97,6 +98,16 @@ struct ElasticBinding {
   double stiffness = 0;    ///< [N/m]
 };
 
+/// A vertex of one solid that slides on another one: it keeps its distance from the surface as that is now.
+struct ElasticSlide {
+  Index vertex = 0;
+  Index first = 0, end = 0;       ///< The surface: triangles of ElasticModel::slide_surface.
+  Index triangle = 0;             ///< The nearest one of them at rest.
+  double gap_m = 0;               ///< g0: distance from the surface at rest, negative inside [m].
+  double stiffness = 0;           ///< [N/m]
+  Vec3d normal = Vec3d::UnitZ();  ///< At rest, from the surface outwards; unit.
+};
+
 /// a of the variance term: the errors over Poisson's ratio, split and shape of elements are least from 0.2 to 0.3.
 inline constexpr double kPatchVariance = 0.25;
 /// The same for a patch without a vertex inside the body, as in a wall of one layer: right to 4 % for the organ's wall
@@ -117,8 +128,10 @@ struct ElasticModel {
   std::vector<ElasticShearLink> shear_links;  ///< Sorted by (a, b), a < b.
   std::vector<ElasticBinding> bindings;
   std::vector<ElasticHinge> attachments;  ///< Of one solid to another: v[0], and a point of a triangle of the other.
-  double stiffening = 0;                  ///< c of the membrane.
-  double mu_Pa = 0, lambda_Pa = 0;        ///< Lamé parameters of the organ.
+  std::vector<ElasticSlide> slides;
+  std::vector<Triangle> slide_surface;  ///< Surfaces of the solids that something slides on, one after the other.
+  double stiffening = 0;                ///< c of the membrane.
+  double mu_Pa = 0, lambda_Pa = 0;      ///< Lamé parameters of the organ.
   double damping_per_s = 0;
   Vec3d gravity = Vec3d::Zero();
 

@@ -67,9 +67,38 @@ void CoarseSpace::AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, flo
   sums.End();
 }
 
-void CoarseSpace::AddRows(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int rows) {
+/// Between two solids: weights of the coarse nodes first, since the corners of a triangle mostly share theirs. The
+/// solids' part of the matrix is that at rest. As far as they have turned it is too soft in some directions, and with
+/// the slides' normals alone they swing on (deploy/docs/measurements/physics, Sliding solids): across the normal a
+/// slide then counts in part.
+void CoarseSpace::AddSlide(const Element& slide, float turned) {
+  std::array<std::pair<std::uint16_t, float>, kCellCorners * 4> weights;
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < slide.at.size(); ++k) {
+    const LatticePlace& place = grid_.tube_weights[slide.at[k].base / kVertexFloats];
+    for (std::size_t corner = 0; corner < kCellCorners; ++corner) {
+      const auto end = weights.begin() + static_cast<std::ptrdiff_t>(count);
+      const auto at = std::find_if(weights.begin(), end, [&](const auto& w) { return w.first == place.node[corner]; });
+      if (at == end) weights[count++] = {place.node[corner], 0.0f};
+      at->second += slide.weight[k] * place.weight[corner];
+    }
+  }
+  const float normal = slide.m.squaredNorm();
+  const Eigen::Matrix3f stiffness =
+      (slide.kt + turned * normal) * Eigen::Matrix3f::Identity() + (1 - turned) * slide.m * slide.m.transpose();
+  for (std::size_t a = 0; a < count; ++a) {
+    for (std::size_t b = 0; b < count; ++b) {
+      matrix_.next.block<3, 3>(3 * weights[a].first, 3 * weights[b].first) +=
+          weights[a].second * weights[b].second * stiffness;
+    }
+  }
+}
+
+void CoarseSpace::AddRows(const Sheet& sheet, const SheetMatrix& matrix, float inertia, const Slides& slides,
+                          int rows) {
   if (matrix_.next_row == 0) {
     matrix_.next = matrix_.constant + inertia * matrix_.tube_mass;
+    for (std::size_t i = 0; i < slides.elements().size(); ++i) AddSlide(slides.elements()[i], slides.turned()[i]);
   }
   for (const int end = std::min(matrix_.next_row + rows, sheet_rows_); matrix_.next_row < end; ++matrix_.next_row) {
     AddSheetRow(sheet, matrix, inertia, matrix_.next_row);
@@ -81,20 +110,20 @@ void CoarseSpace::AddRows(const Sheet& sheet, const SheetMatrix& matrix, float i
   }
 }
 
-void CoarseSpace::Assemble(const Sheet& sheet, const SheetMatrix& matrix, float inertia) {
+void CoarseSpace::Assemble(const Sheet& sheet, const SheetMatrix& matrix, float inertia, const Slides& slides) {
   matrix_.next_row = 0;
-  AddRows(sheet, matrix, inertia, sheet_rows_);
+  AddRows(sheet, matrix, inertia, slides, sheet_rows_);
   (void)matrix_.factor.Take(kernels_, matrix_.next);
   matrix_.complete = false;
 }
 
-void CoarseSpace::AssembleNextPart(const Sheet& sheet, const SheetMatrix& matrix, float inertia) {
+void CoarseSpace::AssembleNextPart(const Sheet& sheet, const SheetMatrix& matrix, float inertia, const Slides& slides) {
   if (matrix_.complete) {
     // When it is refused, the last factor stays in force.
     matrix_.complete =
         matrix_.factor.Continue(kernels_, matrix_.next, kFactorColumnsPerStep) == CoarseFactor::Progress::kMore;
   } else {
-    AddRows(sheet, matrix, inertia, kRowsPerStep);
+    AddRows(sheet, matrix, inertia, slides, kRowsPerStep);
   }
 }
 

@@ -31,10 +31,10 @@ class CoarseSpace {
               const Kernels& kernels);
 
   /// A new coarse matrix, in force at once.
-  void Assemble(const Sheet& sheet, const SheetMatrix& matrix, float inertia);
-  /// The next part of the next matrix: rows of the membrane, and when all of them are in it columns of its factor, with
-  /// the last of which it is in force. So no step pays for all of it.
-  void AssembleNextPart(const Sheet& sheet, const SheetMatrix& matrix, float inertia);
+  void Assemble(const Sheet& sheet, const SheetMatrix& matrix, float inertia, const Slides& slides);
+  /// The next part of the next matrix: slides as they are now and rows of the membrane, and when all of them are in it
+  /// columns of its factor, with the last of which it is in force. So no step pays for all of it.
+  void AssembleNextPart(const Sheet& sheet, const SheetMatrix& matrix, float inertia, const Slides& slides);
 
   /// The hats as the kernels read them.
   [[nodiscard]] HatLevel hats();
@@ -170,7 +170,8 @@ class CoarseSpace {
   void AddBindings(const ElasticModel& model, const ParticleStore& particles);
   void AddWeights(const ElasticModel& model, const ParticleStore& particles, Index particle, double share,
                   std::vector<std::pair<int, double>>* weights) const;
-  void AddRows(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int rows);
+  void AddRows(const Sheet& sheet, const SheetMatrix& matrix, float inertia, const Slides& slides, int rows);
+  void AddSlide(const Element& slide, float turned);
   void AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int row);
   [[nodiscard]] std::array<std::uint32_t, 2> HatsOf(std::uint32_t col) const;
   [[nodiscard]] float HatAt(std::uint32_t hat, int row, int col) const;

@@ -6,6 +6,7 @@
 #include "physics_node/collision/tissue_collision.h"
 #include "physics_node/implicit/kernels.h"
 #include "physics_node/simd/sse.h"
+#include "services/base/core/solids.h"
 
 namespace fulcrum::physics::implicit {
 namespace {
@@ -31,23 +32,6 @@ constexpr float kSlideTime_s = 3e-4f;
 constexpr float kOnsetDepth_m = 8e-5f, kOnsetOverPath = 3.0f, kMostOnset_m = 1e-3f;
 /// Least length of a binding that is divided by [m].
 constexpr float kLeastBindingLength_m = 1e-9f;
-
-template <class Sum>
-Vec3f Combine(const Sum& e, const float* field) {
-  Vec3f sum = Vec3f::Zero();
-  for (int k = 0; k < e.count; ++k) {
-    const auto i = static_cast<std::size_t>(k);
-    sum += e.weight[i] * FieldAt(field, e.at[i]);
-  }
-  return sum;
-}
-template <class Sum>
-void Spread(const Sum& e, const Vec3f& v, float* field) {
-  for (int k = 0; k < e.count; ++k) {
-    const auto i = static_cast<std::size_t>(k);
-    AddField(field, e.at[i], e.weight[i] * v);
-  }
-}
 
 // A binding joins a node of the membrane, coordinate by coordinate, to three vertices of the organ, a register each.
 
@@ -147,7 +131,7 @@ bool Elements::IsTissue(const ContactRow& row) { return (row.source & TissueColl
 
 Elements::Elements(const TissueScene& scene, const ElasticModel& model, const ParticleStore& particles,
                    const Partition& partition)
-    : hinges_(model, particles), guard_(model, SolidOfVertices(scene)) {
+    : hinges_(model, particles), guard_(model, SolidOfVertices(scene)), slides_(model, particles) {
   for (const ElasticBinding& binding : model.bindings) {
     Element e;
     e.at[0] = particles.Ref(binding.membrane);
@@ -293,6 +277,7 @@ void Elements::LineariseBindings(const float* place) {
 
 void Elements::AddContactForces(float* residual) const {
   guard_.AddForce(residual);
+  slides_.AddForce(residual);
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     Spread(contacts_[i], contact_force_[i], residual);
   }
@@ -313,11 +298,12 @@ double Elements::MultiplyBindingsAndContacts(const float* p, const Selection& se
     sum += static_cast<double>(d.dot(force));
     contact_product_.push_back(force);
   }
-  return sum;
+  return sum + slides_.Multiply(p);
 }
 
 double Elements::AddContactProduct(const float* p, float scale, float* out) {
   const double sum = guard_.Apply(p, scale, out);
+  slides_.AddProduct(scale, out);
   const std::span<const Element> contacts = contacts_in_product();
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     Spread(contacts[i], scale * contact_product_[i], out);
@@ -344,7 +330,7 @@ void Elements::Add(const Selection& selection, float* field) const {
 }
 
 double Elements::EnergyOfBindingsAndContacts(const float* place, std::span<const ContactRow> contacts) const {
-  double sum = guard_.Energy(place);
+  double sum = guard_.Energy(place) + slides_.Energy(place);
   for (const std::uint32_t i : computed_.bindings) {
     const __m128 d = _mm_sub_ps(CombineBinding(bindings_[i], place), _mm_load_ps(binding_rest_[i].offset.data()));
     const float stretch = std::sqrt(_mm_cvtss_f32(Dot3(d, d))) - binding_rest_[i].length;

@@ -19,22 +19,14 @@
 
 #include "physics_node/collision/contact_row.h"
 #include "physics_node/energy/elastic_model.h"
+#include "physics_node/implicit/element.h"
 #include "physics_node/implicit/hinge_matrix.h"
 #include "physics_node/implicit/inversion_guard.h"
 #include "physics_node/implicit/regions.h"
+#include "physics_node/implicit/slides.h"
 #include "physics_node/tissue/tissue_model.h"
 
 namespace fulcrum::physics::implicit {
-
-/// A sum over up to four particles, weight_k x_k, and what resists its change: kt I + m m^T.
-struct Element {
-  int count = 4;
-  std::array<ParticleRef, 4> at;
-  std::array<float, 4> weight{0, 0, 0, 0};
-  float kt = 0;             ///< [N/m]
-  Vec3f m = Vec3f::Zero();  ///< [sqrt(N/m)]
-  bool active = true;
-};
 
 /// Elements that act in a part of the tissue.
 struct Selection {
@@ -77,6 +69,10 @@ class Elements {
                     std::span<const ContactRow> contacts);
   [[nodiscard]] std::span<const Element> contacts() const { return contacts_; }
   [[nodiscard]] const InversionGuard& guard() const { return guard_; }
+  /// Finds where solids slide on each other; independent of both.
+  void FindSlides(const float* place, const Regions& regions) { slides_.Linearise(place, regions); }
+  [[nodiscard]] const Slides& slides() const { return slides_; }
+  void RestartSlides() { slides_.Restart(); }
   /// A contact with a tool, not of tissue with tissue.
   [[nodiscard]] static bool IsStiff(const Element& contact) { return contact.m.squaredNorm() > kStiffContact_N_per_m; }
 
@@ -87,7 +83,7 @@ class Elements {
   /// Linearises at `place`, for AddInRegion.
   void LineariseHinges(const float* place) { hinges_.MakeForce(place, computed_.hinge_rows); }
   void LineariseBindings(const float* place);
-  /// residual += forces of the guard and of the contacts.
+  /// residual += forces of the guard, the slides and the contacts.
   void AddContactForces(float* residual) const;
   /// While set, contacts take no part in products.
   void ExcludeContacts(bool exclude) { contacts_excluded_ = exclude; }
@@ -97,8 +93,8 @@ class Elements {
     return hinges_.Multiply(p, selection.hinge_rows);
   }
   double MultiplyBindingsAndContacts(const float* p, const Selection& selection);
-  /// out += scale * the contacts' part of the last product. The guard, which is mostly empty, is multiplied here;
-  /// returns its share of p . K p.
+  /// out += scale * the part of contacts and slides in the last product. The guard, which is mostly empty, is
+  /// multiplied here; returns its share of p . K p.
   double AddContactProduct(const float* p, float scale, float* out);
   /// field += the last force, or the last product of all that is computed, of bindings and hinges in a region that is
   /// computed.
@@ -107,7 +103,7 @@ class Elements {
   void Add(const Selection& selection, float* field) const;
 
   [[nodiscard]] double EnergyOfHinges(const float* place) { return hinges_.Energy(place, computed_.hinge_rows); }
-  /// Of bindings, contacts and guarded tetrahedra [J].
+  /// Of bindings, contacts, slides and guarded tetrahedra [J].
   [[nodiscard]] double EnergyOfBindingsAndContacts(const float* place, std::span<const ContactRow> contacts) const;
 
   /// Normal and friction forces of contacts with tools at `place` + `d`, sliding measured from `start`, h ago.
@@ -149,6 +145,7 @@ class Elements {
   bool contacts_excluded_ = false;
   HingeMatrix hinges_;
   InversionGuard guard_;
+  Slides slides_;
 };
 
 }  // namespace fulcrum::physics::implicit

@@ -87,6 +87,16 @@ void WakeTouched(const SolverContext& context, const BoundaryConditions& boundar
   std::swap(*now, *last);
 }
 
+/// What slides on something that moves stays awake, as a neighbour does.
+void WakeSliding(const Slides& slides, Regions* regions) {
+  const Partition& partition = regions->partition();
+  for (const Element& e : slides.elements()) {
+    if (std::ranges::any_of(e.at, [&](ParticleRef at) { return regions->moving(partition.Of(at)); })) {
+      for (const ParticleRef at : e.at) regions->Wake(partition.Of(at));
+    }
+  }
+}
+
 /// After a change of the computed regions: elements, levels and blocks follow. What is no longer computed does not move
 /// and is no direction of the solve.
 void FollowComputedRegions(const SolverContext& context, SolverState* state, KrylovVectors* krylov) {
@@ -154,7 +164,7 @@ ImplicitSolver::ImplicitSolver(const TissueScene& scene, const ElasticModel& mod
   Linearise(context_, inertia, {}, &state_, &scratch_);
   state_.linearisation.lacks_element_forces = false;  // Nothing is solved here.
   const LinearSystem system(context_, inertia.inertia, &state_, &scratch_);
-  state_.coarse.Assemble(system.sheet, system.sheet_matrix, inertia.inertia);
+  state_.coarse.Assemble(system.sheet, system.sheet_matrix, inertia.inertia, state_.elements.slides());
 }
 
 void ImplicitSolver::UpdateTopology(const TissueModel& tissue) {
@@ -224,6 +234,7 @@ SubstepReport ImplicitSolver::Substep(float h, int iterations, std::span<const H
   // A fold that opens slowly is no rest.
   state_.elements.guard().ForVerticesFound(
       [this](Index v) { state_.regions.Wake(model_.partition.At(false, static_cast<int>(v))); });
+  WakeSliding(state_.elements.slides(), &state_.regions);
   if (state_.regions.Rebuild()) {
     FollowComputedRegions(context_, &state_, &scratch_.krylov);
   }
@@ -268,6 +279,7 @@ Vec3f ImplicitSolver::ForceOn(ParticleRef at) const { return FieldAt(state_.line
 Vec3f ImplicitSolver::Velocity(ParticleRef at) const { return FieldAt(state_.velocity.data(), at); }
 void ImplicitSolver::SetVelocity(ParticleRef at, const Vec3f& v) {
   PutField(state_.velocity.data(), at, v);
+  state_.elements.RestartSlides();
   state_.regions.Wake(model_.partition.Of(at));
 }
 void ImplicitSolver::SleepStill() {

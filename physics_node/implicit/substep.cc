@@ -102,7 +102,7 @@ void PredictConstrained(const SolverContext& context, const BoundaryConditions& 
 
 // Linearisation.
 
-/// Contacts, folds and frayed edges stiffen the diagonal of what they touch.
+/// Contacts, slides, folds and frayed edges stiffen the diagonal of what they touch.
 void UpdateElementDiagonal(const ImplicitModel& model, SolverState* state) {
   Linearisation& at = state->linearisation;
   for (const std::size_t i : at.raised) {
@@ -116,16 +116,16 @@ void UpdateElementDiagonal(const ImplicitModel& model, SolverState* state) {
   const auto renew_blocks = [&](ParticleRef particle) {
     state->organ_blocks.urgent[static_cast<std::size_t>(model.partition.Of(particle))] = kUrgentTwice;
   };
-  // Blocks of the organ that only soft contacts touch are renewed when their region is due.
-  for (const Element& contact : state->elements.contacts()) {
-    const float stiffness = contact.kt + contact.m.squaredNorm();
-    for (std::size_t k = 0; k < static_cast<std::size_t>(contact.count); ++k) {
-      raise(model.layout.ScalarIndex(contact.at[k]), stiffness * contact.weight[k] * contact.weight[k]);
-      if (Elements::IsStiff(contact)) {
-        renew_blocks(contact.at[k]);
-      }
+  // Blocks of the organ that only soft contacts or slides touch are renewed when their region is due.
+  const auto raise_all = [&](const Element& e, bool renews) {
+    const float stiffness = e.kt + e.m.squaredNorm();
+    for (std::size_t k = 0; k < static_cast<std::size_t>(e.count); ++k) {
+      raise(model.layout.ScalarIndex(e.at[k]), stiffness * e.weight[k] * e.weight[k]);
+      if (renews) renew_blocks(e.at[k]);
     }
-  }
+  };
+  for (const Element& contact : state->elements.contacts()) raise_all(contact, Elements::IsStiff(contact));
+  for (const Element& slide : state->elements.slides().elements()) raise_all(slide, false);
   for (const FrayedEdge& edge : state->edges.frayed_edges()) {
     for (const std::uint32_t i : edge.at) {
       raise(i, edge.stiffness);
@@ -202,7 +202,7 @@ void LineariseVerticesAndLevels(const SolverContext& context, const Inertia& ine
   };
   ForTasksAndSideTask(&context.workers, state->regions.computed(), body, [&] {
     if (state->coarse_due && state->coarse.SheetIsWhole(state->regions)) {
-      state->coarse.AssembleNextPart(system.sheet, system.sheet_matrix, inertia.inertia);
+      state->coarse.AssembleNextPart(system.sheet, system.sheet_matrix, inertia.inertia, state->elements.slides());
       state->coarse_due = false;
     }
   });
@@ -307,11 +307,13 @@ std::uint32_t Predict(const SolverContext& context, const Inertia& inertia, cons
 void Linearise(const SolverContext& context, const Inertia& inertia, std::span<const ContactRow> contacts,
                SolverState* state, SolverScratch* scratch) {
   Linearisation& at = state->linearisation;
-  context.workers.Run(2, 0, [&](int task, int) {
+  context.workers.Run(state->elements.slides().empty() ? 2 : 3, 0, [&](int task, int) {
     if (task == 0) {
       state->elements.FindContacts(inertia.h, at.point.data(), context.particles.pool(), state->regions, contacts);
-    } else {
+    } else if (task == 1) {
       state->elements.FindInversions(at.point.data(), state->regions);
+    } else {
+      state->elements.FindSlides(at.point.data(), state->regions);
     }
   });
   UpdateElementDiagonal(context.model, state);

@@ -75,12 +75,13 @@ inline scene::SheetBody Veil(const Vec3d& corner) {
 }
 
 /// Adds solids beside the organ, 1 `pad`, 2 `lump`, 3 `strand`, 4 `other strand`, the pad's lower corner at `corner`.
-/// The lump is loose unless it is `joined` to the pad. If `veiled`, with a second sheet.
+/// The lump is loose unless it is `joined` to the pad, as `kind` says. If `veiled`, with a second sheet.
 inline scene::SceneData WithSolids(scene::SceneSettings settings, const Vec3d& corner, bool joined,
-                                   double strand_Pa = 2e5, bool veiled = false) {
+                                   double strand_Pa = 2e5, bool veiled = false,
+                                   scene::AttachKind kind = scene::AttachKind::kGlued) {
   settings.physics.mode = PhysicsMode::kAccurate;
   settings.attach = {{"strand", "pad", 0.002, 5e4}};
-  if (joined) settings.attach.push_back({"lump", "pad", 0.002, 2e4});
+  if (joined) settings.attach.push_back({"lump", "pad", 0.002, 2e4, kind});
   scene::Anatomy anatomy = scene::ProceduralAnatomy(settings);
   const auto at = [&](double x, double y, double z) { return Vec3d(corner + Vec3d(x, y, z)); };
   scene::SolidBody pad = Box("pad", corner, {0.04, 0.04, 0.015}, {8, 8, 3}, 2e4);
@@ -98,10 +99,11 @@ inline scene::SceneData WithSolids(scene::SceneSettings settings, const Vec3d& c
 }
 
 /// The small scene with solids 120 mm beside the organ.
-inline scene::SceneData SeveralSolids(const Vec3f& gravity = Vec3f::Zero(), bool joined = false, bool veiled = false) {
+inline scene::SceneData SeveralSolids(const Vec3f& gravity = Vec3f::Zero(), bool joined = false, bool veiled = false,
+                                      scene::AttachKind kind = scene::AttachKind::kGlued) {
   scene::SceneSettings settings = scene::Small();
   settings.physics.gravity = gravity;
-  return WithSolids(std::move(settings), {0.12, -0.02, 0}, joined, 2e5, veiled);
+  return WithSolids(std::move(settings), {0.12, -0.02, 0}, joined, 2e5, veiled, kind);
 }
 
 }  // namespace fulcrum

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "physics_node/energy/tet_energy.h"
+#include "tests/numerics/physics/reference/slide_energy.h"
 
 namespace fulcrum::physics::reference {
 namespace {
@@ -216,6 +217,7 @@ double ElasticEnergy::Energy(const Points& x) const {
     const double stretch = (x.col(b.membrane) - foot).norm() - b.rest_length;
     energy += b.stiffness / 2 * stretch * stretch;
   }
+  energy += SlideEnergy(model_, x);
   for (Eigen::Index p = 0; p < particle_count(); ++p) {
     const auto i = static_cast<std::size_t>(p);
     energy -= model_.mass[i] * model_.gravity.dot(x.col(p));
@@ -300,6 +302,7 @@ void ElasticEnergy::Gradient(const Points& x, Points* gradient) const {
       gradient->col(b.surface[i]) -= b.barycentric[i] * force;
     }
   }
+  AddSlideGradient(model_, x, gradient);
   if (!model_.gravity.isZero()) {
     for (Eigen::Index p = 0; p < particle_count(); ++p) {
       gradient->col(p) -= model_.mass[static_cast<std::size_t>(p)] * model_.gravity;
@@ -399,6 +402,13 @@ SparseMatrix ElasticEnergy::Hessian(const Points& x, bool positive) const {
       for (std::size_t j = 0; j < 4; ++j) {
         AddBlock(v[i], v[j], c[i] * c[j] * H, &out);
       }
+    }
+  }
+  for (const ElasticSlide& slide : model_.slides) {
+    const SlideFoot foot = FootOf(model_, slide, x);
+    const Mat3d block = slide.stiffness * foot.normal * foot.normal.transpose();
+    for (std::size_t i = 0; i < 4; ++i) {
+      for (std::size_t j = 0; j < 4; ++j) AddBlock(foot.v[i], foot.v[j], foot.c[i] * foot.c[j] * block, &out);
     }
   }
   SparseMatrix H(3 * particle_count(), 3 * particle_count());

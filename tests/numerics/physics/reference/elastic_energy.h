@@ -28,7 +28,8 @@ class ElasticEnergy {
   /// dE/dx [N], also on particles that are fixed.
   void Gradient(const Points& x, Points* gradient) const;
   /// d2E/dx2, lower triangle, 3n x 3n [N/m]. With `positive`, each element's part is clamped to be positive
-  /// semidefinite, so that a Newton step is a descent direction everywhere.
+  /// semidefinite, so that a Newton step is a descent direction everywhere. Of slides always without the change of
+  /// the normal.
   [[nodiscard]] SparseMatrix Hessian(const Points& x, bool positive) const;
 
  private:
