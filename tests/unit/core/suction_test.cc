@@ -1,0 +1,57 @@
+// The valve of a suction and irrigation tube.
+#include "services/base/core/suction.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace fulcrum {
+namespace {
+
+constexpr float kOpen = 0.7f, kClosed = 0;
+
+TEST(TrumpetValve, ASqueezeAspiratesWhileItLasts) {
+  TrumpetValve valve;
+  EXPECT_EQ(valve.Step(0, kOpen), TubeFlow::kNone);
+  EXPECT_EQ(valve.Step(1, kClosed), TubeFlow::kAspirates);
+  EXPECT_EQ(valve.Step(9, kClosed), TubeFlow::kAspirates);
+  EXPECT_EQ(valve.Step(9.1, kOpen), TubeFlow::kNone);
+}
+
+TEST(TrumpetValve, ASecondSqueezeSoonAfterIrrigates) {
+  TrumpetValve valve;
+  (void)valve.Step(1.0, kClosed);
+  (void)valve.Step(1.2, kOpen);
+  EXPECT_EQ(valve.Step(1.4, kClosed), TubeFlow::kIrrigates);
+  EXPECT_EQ(valve.Step(5.0, kClosed), TubeFlow::kIrrigates);
+  EXPECT_EQ(valve.Step(5.1, kOpen), TubeFlow::kNone);
+  EXPECT_EQ(valve.Step(5.2, kClosed), TubeFlow::kAspirates) << "the last squeeze began 3.8 s ago";
+}
+
+TEST(TrumpetValve, ALateSecondSqueezeAspirates) {
+  TrumpetValve valve;
+  (void)valve.Step(1.0, kClosed);
+  (void)valve.Step(1.2, kOpen);
+  EXPECT_EQ(valve.Step(1.0 + TrumpetValve::kTwice_s, kClosed), TubeFlow::kAspirates);
+}
+
+TEST(TrumpetValve, BetweenTheTwoAnglesNothingChanges) {
+  constexpr float kBetween = 0.5f * (TrumpetValve::kSqueezed_rad + TrumpetValve::kLetGo_rad);
+  TrumpetValve valve;
+  EXPECT_EQ(valve.Step(0, kBetween), TubeFlow::kNone);
+  EXPECT_EQ(valve.Step(1, kClosed), TubeFlow::kAspirates);
+  EXPECT_EQ(valve.Step(2, kBetween), TubeFlow::kAspirates);
+  EXPECT_EQ(valve.Step(3, kOpen), TubeFlow::kNone);
+  EXPECT_EQ(valve.Step(4, kBetween), TubeFlow::kNone);
+}
+
+TEST(TrumpetValve, AHandleThatIsGoneOrUnreadableShutsNothingOpen) {
+  TrumpetValve valve;
+  (void)valve.Step(1, kClosed);
+  valve.Shut();
+  EXPECT_EQ(valve.flow(), TubeFlow::kNone);
+  EXPECT_EQ(valve.Step(5, std::numeric_limits<float>::quiet_NaN()), TubeFlow::kNone);
+}
+
+}  // namespace
+}  // namespace fulcrum
