@@ -21,6 +21,10 @@ ToolShape ShapeOf(const ToolDescription& tool, const ToolPose& pose) {
     add(Vec3f::Zero(), Vec3f(0, 0, -kHookNeck), tool.tip_radius_m, ToolPart::kTip);
     add(Vec3f(0, 0, -kHookNeck), Vec3f(0, 0, -std::max(tool.shaft_length_m, kHookNeck)), tool.shaft_radius_m,
         ToolPart::kShaft);
+  } else if (tool.kind == ToolKind::kSuction) {  // Its handle moves a valve.
+    add(Vec3f(0, 0, -length), Vec3f::Zero(), tool.tip_radius_m, ToolPart::kJaw);
+    add(Vec3f(0, 0, -length), Vec3f(0, 0, -std::max(tool.shaft_length_m, length)), tool.shaft_radius_m,
+        ToolPart::kShaft);
   } else if (tool.kind != ToolKind::kNone) {
     const float half = 0.5f * pose.jaw_rad;
     const Vec3f hinge(0, 0, -length);

@@ -40,6 +40,7 @@ struct ToolShape {
 
 /// Capsules in frame W. Hook: foot from the heel (T's origin, on the shaft axis) along +x, neck, shaft. Grasper and
 /// scissors: two jaws about a hinge at -z * tip_length, opening in the x-z plane by jaw_rad / 2 each, and the shaft.
+/// Suction tube: the last tip_length and the shaft, whatever its handle does.
 [[nodiscard]] ToolShape ShapeOf(const ToolDescription& tool, const ToolPose& pose);
 
 /// Distance between the surface of a capsule and the middle of the sheet in contact [m]. For the bare metal of a hook

@@ -35,6 +35,7 @@ Keypoints KeypointsOf(const ToolDescription& tool, float jaw_rad) {
   if (tool.kind == ToolKind::kHook) {
     return {{"heel", {0, 0, 0}}, {"toe", {length, 0, 0}}, {"neck", {0, 0, -static_cast<double>(render::kHookNeck)}}};
   }
+  if (tool.kind == ToolKind::kSuction) return {{"tip", {0, 0, 0}}, {"neck", {0, 0, -length}}};
   const double half = 0.5 * static_cast<double>(jaw_rad);
   const Vec3d hinge(0, 0, -length), out(length * std::sin(half), 0, length * std::cos(half));
   return {{"jaw_plus", hinge + out}, {"jaw_minus", hinge + Vec3d(-out.x(), 0, out.z())}, {"hinge", hinge}};

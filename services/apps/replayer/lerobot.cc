@@ -77,7 +77,10 @@ struct Layout {
       const ToolKind kind = scene.tools[k].kind;
       if (!TouchesTissue(kind)) continue;
       tools.push_back(k);
-      const char* name = kind == ToolKind::kHook ? "hook" : kind == ToolKind::kScissors ? "scissors" : "grasper";
+      const char* name = kind == ToolKind::kHook       ? "hook"
+                         : kind == ToolKind::kScissors ? "scissors"
+                         : kind == ToolKind::kSuction  ? "suction"
+                                                       : "grasper";
       for (const char* value : {"x", "y", "z", "qx", "qy", "qz", "qw", "jaw", "force"}) {
         names.push_back(Format("%s%zu.%s", name, k, value));
         if (std::string_view(value) != "force") action_names.push_back(names.back());

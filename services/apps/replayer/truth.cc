@@ -42,6 +42,7 @@ std::uint16_t Rounded(double value, double most) {
 TruthClass ClassOfTool(ToolKind kind) {
   return kind == ToolKind::kHook       ? TruthClass::kHook
          : kind == ToolKind::kScissors ? TruthClass::kScissors
+         : kind == ToolKind::kSuction  ? TruthClass::kSuction
                                        : TruthClass::kGrasper;
 }
 
@@ -86,12 +87,14 @@ std::vector<Index> ChartsOf(const DrawnSurface& burn) {
 }  // namespace
 
 const char* NameOf(TruthClass what) {
-  constexpr std::array<const char*, kTruthClasses> kNames{"none",    "surroundings", "rectum",   "fat",  "membrane",
-                                                          "grasper", "hook",         "scissors", "organ"};
+  constexpr std::array<const char*, kTruthClasses> kNames{"none",    "surroundings", "rectum",   "fat",   "membrane",
+                                                          "grasper", "hook",         "scissors", "organ", "suction"};
   return kNames[static_cast<std::size_t>(what)];
 }
 
-bool IsTool(TruthClass what) { return what >= TruthClass::kGrasper && what <= TruthClass::kScissors; }
+bool IsTool(TruthClass what) {
+  return (what >= TruthClass::kGrasper && what <= TruthClass::kScissors) || what == TruthClass::kSuction;
+}
 
 Moment::Moment(render::LaparoscopeView* view, const render::Laparoscope& from, const SceneView& scene, int columns,
                int rows)

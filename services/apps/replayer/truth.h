@@ -26,9 +26,10 @@ enum class TruthClass : std::uint8_t {
   kGrasper,
   kHook,
   kScissors,
-  kOrgan  ///< A solid that is no bowel.
+  kOrgan,   ///< A solid that is no bowel.
+  kSuction  ///< A suction and irrigation tube.
 };
-inline constexpr int kTruthClasses = 9;
+inline constexpr int kTruthClasses = 10;
 [[nodiscard]] const char* NameOf(TruthClass what);
 [[nodiscard]] bool IsTool(TruthClass what);
 

@@ -26,11 +26,9 @@ constexpr std::size_t kMaxKeys = 2000;
 constexpr std::size_t kMaxStructures = 64;
 constexpr std::size_t kMaxPathPoints = 64;
 
-const StrictMap::Choices<ToolKind> kToolKinds = {{"none", ToolKind::kNone},
-                                                 {"grasper", ToolKind::kGrasper},
-                                                 {"hook", ToolKind::kHook},
-                                                 {"scissors", ToolKind::kScissors},
-                                                 {"scope", ToolKind::kScope}};
+const StrictMap::Choices<ToolKind> kToolKinds = {{"none", ToolKind::kNone},   {"grasper", ToolKind::kGrasper},
+                                                 {"hook", ToolKind::kHook},   {"scissors", ToolKind::kScissors},
+                                                 {"scope", ToolKind::kScope}, {"suction", ToolKind::kSuction}};
 const StrictMap::Choices<ProtectedKind> kProtectedKinds = {{"ureter", ProtectedKind::kUreter},
                                                            {"nerve", ProtectedKind::kNerve}};
 const StrictMap::Choices<std::uint32_t> kPedals = {
@@ -195,11 +193,11 @@ StructureSettings ReadStructure(StrictMap map) {
 }
 
 void ReadToolMeshes(StrictMap map, const ToolDescription& tool, const Folders& folders, ToolMeshSettings* meshes) {
-  const bool has_jaws = tool.kind != ToolKind::kHook;
+  const bool has_jaws = tool.kind != ToolKind::kHook && tool.kind != ToolKind::kSuction;
   if (tool.kind == ToolKind::kScope) map.Fail("body", "a scope is not seen");
   meshes->scale_m = map.Choice("unit", meshes->scale_m, kLengthUnits);
   if (!has_jaws && map.Has("jaws")) {
-    map.Fail("jaws", "a hook has none");
+    map.Fail("jaws", tool.kind == ToolKind::kHook ? "a hook has none" : "a suction tube has none");
   }
   meshes->body_file = FindFile(map, "body", map.Text("body"), folders);
   if (has_jaws) {
@@ -237,8 +235,10 @@ void ReadTool(StrictMap map, const Folders& folders, const RenderParams& render,
 }
 
 /// `sheets`: names of those of the scene, the first one first.
-ScriptKeySettings ReadKey(StrictMap map, double duration_s, const std::vector<std::string>& sheets) {
+ScriptKeySettings ReadKey(StrictMap map, double duration_s, ToolKind kind, const std::vector<std::string>& sheets) {
+  constexpr double kShut_rad = 0.87;  // 50 degrees: of a tube's handle that is let go.
   ScriptKeySettings key;
+  if (kind == ToolKind::kSuction) key.jaw_rad = kShut_rad;
   key.time_s = map.NumberSi("time_s", Range::Between(0, duration_s));
   if (map.Has("world_mm")) {
     key.world_m = map.Vector3Si("world_mm", Range::Between(-1000, 1000));
@@ -279,7 +279,7 @@ void ReadScript(StrictMap map, SceneSettings* scene) {
     const std::string name = "tool" + std::to_string(tool);
     double last_s = -1;
     for (StrictMap& entry : map.Maps(name, 0, kMaxKeys)) {
-      ScriptKeySettings key = ReadKey(entry, scene->script_duration_s, sheets);
+      ScriptKeySettings key = ReadKey(entry, scene->script_duration_s, scene->tools[tool].kind, sheets);
       key.tool = tool;
       if (scene->tools[tool].kind == ToolKind::kNone) {
         entry.Fail("time_s", "the scene has no " + name);

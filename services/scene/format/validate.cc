@@ -331,7 +331,9 @@ void CheckToolMeshes(const SceneView& s) {
   }
   for (std::size_t k = 0; k < parts.size(); ++k) {
     const ToolKind kind = s.tools[k].kind;
-    const std::uint32_t whole = kind == ToolKind::kNone ? 0 : kind == ToolKind::kHook ? 1 : 7;
+    const std::uint32_t whole = kind == ToolKind::kNone                                 ? 0
+                                : kind == ToolKind::kHook || kind == ToolKind::kSuction ? 1
+                                                                                        : 7;
     if (parts[k] != 0 && parts[k] != whole) {
       Fail("tool_meshes", "tool ", k, ": not the parts that its kind has");
     }

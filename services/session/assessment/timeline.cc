@@ -24,6 +24,8 @@ const char* NameOf(ToolKind kind) {
       return "Scissors";
     case ToolKind::kScope:
       return "Scope";
+    case ToolKind::kSuction:
+      return "Suction tube";
     default:
       return "Instrument";
   }

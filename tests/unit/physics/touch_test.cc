@@ -10,6 +10,7 @@
 
 #include "physics_node/collision/closest.h"
 #include "physics_node/collision/kernels.h"
+#include "physics_node/collision/tool_shape.h"
 #include "tests/unit/physics/kernels_scalar.h"
 
 namespace fulcrum::physics {
@@ -207,6 +208,21 @@ TEST_F(Touch, FeetAreTheClosestPointsOfTheTriangles) {
         ASSERT_EQ(side > 0, oracle.side[lane] > 0);
       }
     }
+  }
+}
+
+TEST(ToolShape, TheHandleOfASuctionTubeMovesNothing) {
+  ToolDescription tube;
+  tube.kind = ToolKind::kSuction;
+  tube.shaft_radius_m = tube.tip_radius_m = 2.5f * kMm;
+  tube.shaft_length_m = 330 * kMm;
+  tube.tip_length_m = 18 * kMm;
+  for (const float jaw_rad : {0.0f, 0.9f}) {
+    const ToolShape shape = ShapeOf(tube, {Vec3f::Zero(), Quatf::Identity(), jaw_rad});
+    ASSERT_EQ(shape.count, 2);
+    EXPECT_EQ(shape.capsules[0].b, Vec3f(0, 0, 0)) << "the tip";
+    EXPECT_EQ(shape.capsules[0].a, shape.capsules[1].a) << "a straight rod";
+    EXPECT_EQ(shape.capsules[1].b, Vec3f(0, 0, -330 * kMm));
   }
 }
 
