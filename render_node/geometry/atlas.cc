@@ -60,7 +60,8 @@ Atlas::Atlas(const SceneView& scene) : texel_m_(scene.membrane.texel_m) {
   height_ = texels_of(extent.y());
   film_width_ = (width_ + kFilmCell - 1) / kFilmCell;
   film_height_ = (height_ + kFilmCell - 1) / kFilmCell;
-  film_.assign(2u * static_cast<std::size_t>(film_width_) * static_cast<std::size_t>(film_height_), 0);
+  film_.assign(std::size_t{kFilmBytes} * static_cast<std::size_t>(film_width_) * static_cast<std::size_t>(film_height_),
+               0);
   blocks_x_ = (width_ + kBlock - 1) / kBlock;
   covered_.assign(static_cast<std::size_t>(blocks_x_) * ((height_ + kBlock - 1) / kBlock), 0);
   touched_ = covered_;
@@ -104,22 +105,13 @@ AtlasRect Atlas::Apply(const TemperaturePatch& patch) {
   return rect;
 }
 
-bool Atlas::Stain(const Vec2f& material, float radius_m, float thickness) {
-  const float cell = kFilmCell * texel_m_;
-  const Vec2f low = (material.array() - radius_m).matrix() / cell, high = (material.array() + radius_m).matrix() / cell;
-  const int x0 = std::max(0, static_cast<int>(low.x())), x1 = std::min(film_width_ - 1, static_cast<int>(high.x()));
-  const int y0 = std::max(0, static_cast<int>(low.y())), y1 = std::min(film_height_ - 1, static_cast<int>(high.y()));
-  if (x1 < x0 || y1 < y0) {
-    return false;
-  }
-  for (int y = y0; y <= y1; ++y) {
-    for (int x = x0; x <= x1; ++x) {
-      const Vec2f p((static_cast<float>(x) + 0.5f) * cell, (static_cast<float>(y) + 0.5f) * cell);
-      const float r2 = (p - material).squaredNorm() / (radius_m * radius_m);
-      Raise(255 * thickness * std::max(0.0f, 1 - r2), &film_[2 * TexelIndex(x, y, film_width_)]);
-    }
-  }
-  film_change_ = film_change_.United({x0, y0, x1 - x0 + 1, y1 - y0 + 1});
+bool Atlas::SetLiquid(int x, int y, std::uint8_t blood, std::uint8_t clot, std::uint8_t water) {
+  std::uint8_t* cell = &film_[kFilmBytes * TexelIndex(x, y, film_width_)];
+  if (cell[0] == blood && cell[2] == clot && cell[3] == water) return false;
+  cell[0] = blood;
+  cell[2] = clot;
+  cell[3] = water;
+  film_change_ = film_change_.United({x, y, 1, 1});
   return true;
 }
 
@@ -128,7 +120,7 @@ float Atlas::Blood(const Vec2f& material) const {
   const int x = static_cast<int>(std::floor(material.x() / cell)),
             y = static_cast<int>(std::floor(material.y() / cell));
   if (x < 0 || y < 0 || x >= film_width_ || y >= film_height_) return 0;
-  return static_cast<float>(film_[2 * TexelIndex(x, y, film_width_)]) / 255;
+  return static_cast<float>(film_[kFilmBytes * TexelIndex(x, y, film_width_)]) / 255;
 }
 
 /// Marks what lies beside the removed texel (x, y).
@@ -141,7 +133,7 @@ void Atlas::MarkRim(int x, int y) {
   for (int v = y0; v <= y1; ++v) {
     for (int u = x0; u <= x1; ++u) {
       const Vec2f p((static_cast<float>(u) + 0.5f) * cell, (static_cast<float>(v) + 0.5f) * cell);
-      Raise(255 * Ramp((p - texel).norm(), 0, kRim_m), &film_[2 * TexelIndex(u, v, film_width_) + 1]);
+      Raise(255 * Ramp((p - texel).norm(), 0, kRim_m), &film_[kFilmBytes * TexelIndex(u, v, film_width_) + 1]);
     }
   }
   film_change_ = film_change_.United({x0, y0, x1 - x0 + 1, y1 - y0 + 1});

@@ -35,17 +35,18 @@ class Atlas {
   /// painted are skipped. Returns the changed rectangle.
   AtlasRect PaintCuts(const SceneView& scene, const TopologyState& topology);
 
-  /// Adds blood on a disc of `radius_m` around (s, t) [m], with `thickness` 0 … 1 in its middle; thicker existing blood
-  /// is kept. Blood is independent of the patches. Returns whether the disc lies on the atlas.
-  bool Stain(const Vec2f& material, float radius_m, float thickness);
+  /// Sets the liquid in a cell of the film: blood and clot together, clot, water (geometry/sheet_fluid.h). It is
+  /// independent of the patches. Returns whether it was another one. @pre the cell is part of the film.
+  bool SetLiquid(int x, int y, std::uint8_t blood, std::uint8_t clot, std::uint8_t water);
 
-  /// The film: two bytes per 2 x 2 texels, row by row as the texels. First the thickness of the blood; second the
-  /// nearness of removed tissue, 255 where there is some and 0 from kRim_m on. In a map of its own, because it is
-  /// interpolated between texels, which may be removed on one side only.
+  /// The film: kFilmBytes per 2 x 2 texels, row by row as the texels. First the thickness of blood and clot; second the
+  /// nearness of removed tissue, 255 where there is some and 0 from kRim_m on; third that of the clot, last of the
+  /// water. In a map of its own, because it is interpolated between texels, which may be removed on one side only.
+  static constexpr int kFilmBytes = 4;
   [[nodiscard]] std::span<const std::uint8_t> film() const { return film_; }
   [[nodiscard]] int film_width() const { return film_width_; }
   [[nodiscard]] int film_height() const { return film_height_; }
-  /// Thickness of the blood at (s, t) [m], 0 … 1; 0 outside the sheet.
+  /// Thickness of blood and clot at (s, t) [m], 0 … 1; 0 outside the sheet.
   [[nodiscard]] float Blood(const Vec2f& material) const;
   /// Rectangle of the film, in its own units, that has changed since the last call.
   AtlasRect TakeFilmChange() { return std::exchange(film_change_, {}); }

@@ -15,7 +15,9 @@ constexpr float kBehindHinge = 0.008f;  // [m]
 
 Solid InstrumentSolid(const SceneView& scene, const ToolMesh& mesh) {
   const ToolDescription& tool = scene.tools[mesh.tool];
-  const float steel_from_z = tool.kind == ToolKind::kHook ? -kHookNeck : -tool.tip_length_m - kBehindHinge;
+  const float steel_from_z = tool.kind == ToolKind::kHook      ? -kHookNeck
+                             : tool.kind == ToolKind::kSuction ? -tool.shaft_length_m
+                                                               : -tool.tip_length_m - kBehindHinge;
   const auto triangles = scene.tool_triangles.subspan(mesh.first_triangle, mesh.triangle_count);
   std::vector<Vec3f> areas;  // Normals times twice the area, so that vertex normals are weighted by area.
   std::vector<std::vector<Index>> faces(mesh.vertex_count);

@@ -10,6 +10,8 @@ namespace {
 constexpr Colour kSteel{0.42f, 0.44f, 0.46f, 1.0f};
 constexpr Colour kPolishedSteel{0.60f, 0.61f, 0.63f, 1.0f};
 constexpr Colour kInsulation{0.012f, 0.012f, 0.014f, 0.25f};
+constexpr Colour kTube{0.26f, 0.27f, 0.29f, 1.0f};      // Brushed steel.
+constexpr Colour kBore{0.006f, 0.005f, 0.005f, 0.05f};  // The dark within a tube.
 constexpr Colour kCeramic{0.70f, 0.67f, 0.60f, 0.10f};
 
 void AppendQuadFace(const std::array<Vec3f, 4>& corners, const Colour& colour, Solid* solid) {
@@ -165,6 +167,37 @@ Solid ScissorBlade(const ToolShape& shape) {
     outlines.push_back({{0, bow - w, z}, {h, bow - w, z}, {0.8f * h, bow + w, z}, {0, bow + w, z}});
   }
   AppendLoft(outlines, kPolishedSteel, &solid);
+  return solid;
+}
+
+Solid SuctionTube(const ToolShape& shape) {
+  Solid solid;
+  const float r = shape.tip_radius_m;
+  AppendStraightTube(-shape.shaft_length_m, -shape.tip_length_m, shape.shaft_radius_m, r, 24, kTube, &solid);
+  // A rounded edge, within it the bore.
+  const std::array<Vec3f, 4> path{Vec3f(0, 0, -shape.tip_length_m), Vec3f(0, 0, -0.3f * r), Vec3f(0, 0, -0.08f * r),
+                                  Vec3f::Zero()};
+  const std::array<float, 4> radii{r, r, 0.95f * r, 0.82f * r};
+  AppendTube(path, radii, 24, kTube, &solid);
+  const auto disc = [&solid](const Vec3f& centre, const Vec3f& normal, float radius) {
+    constexpr int kSides = 14;
+    const Vec3f u = normal.unitOrthogonal(), v = normal.cross(u);
+    std::vector<Vec3f> outline;
+    for (int k = 0; k < kSides; ++k) {
+      const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(k) / kSides;
+      outline.emplace_back(centre + radius * (std::cos(angle) * u + std::sin(angle) * v));
+    }
+    AppendCap(outline, normal, kBore, &solid);
+  };
+  constexpr float kAbove = 2e-5f;  // [m]: the discs lie on the steel.
+  disc(Vec3f(0, 0, kAbove), Vec3f::UnitZ(), 0.70f * r);
+  // Side holes: a flat disc of this radius stays within a tenth of a millimetre of the round wall.
+  const float hole = 0.26f * r;
+  for (int k = 0; k < 8; ++k) {
+    const float angle = std::numbers::pi_v<float> * (0.5f * static_cast<float>(k % 4) + (k < 4 ? 0.0f : 0.25f));
+    const Vec3f out(std::cos(angle), std::sin(angle), 0);
+    disc((r + kAbove) * out + Vec3f(0, 0, k < 4 ? -1.6f * r : -3.0f * r), out, hole);
+  }
   return solid;
 }
 

@@ -41,6 +41,9 @@ struct ToolShape {
 [[nodiscard]] Solid GrasperJaw(const ToolShape& shape);
 /// Blade of scissors, curved and pointed; placed like GrasperJaw.
 [[nodiscard]] Solid ScissorBlade(const ToolShape& shape);
+/// Suction and irrigation tube: straight, of steel, with an open end at the origin and two rings of side holes behind
+/// it.
+[[nodiscard]] Solid SuctionTube(const ToolShape& shape);
 /// L-hook: heel at the origin, foot along +x, neck along -z (frame T).
 [[nodiscard]] Solid Hook(const ToolShape& shape);
 

@@ -24,4 +24,19 @@ HandsView MakeHandsView(const SceneView& scene, const RenderParams& camera, int 
   return hands;
 }
 
+PictureHeader MakePictureHeader(const HandsView& view) {
+  PictureHeader header;
+  header.eye_W = view.eye;
+  header.right_W = view.right;
+  header.up_W = view.up;
+  header.forward_W = view.forward;
+  header.pixel_rad = view.pixel;
+  header.tip_W = view.tip;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    header.present |= view.present[i] ? 1u << i : 0u;
+    header.scopes |= view.scope[i] ? 1u << i : 0u;
+  }
+  return header;
+}
+
 }  // namespace fulcrum::render

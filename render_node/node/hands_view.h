@@ -1,4 +1,5 @@
-// What a hand at the window must know of the picture: where a pixel lies, and where the tools are.
+// What a hand at the window must know of the picture, and a reader of live pictures: where a pixel lies, and where the
+// tools are.
 #pragma once
 
 #include "services/base/core/mouse_hands.h"
@@ -11,5 +12,8 @@ namespace fulcrum::render {
 /// @param height of the picture [pixels].
 [[nodiscard]] HandsView MakeHandsView(const SceneView& scene, const RenderParams& camera, int height,
                                       const ToolState& tools);
+
+/// The same for the header of a picture. Stamp, times and sequences remain to be set.
+[[nodiscard]] PictureHeader MakePictureHeader(const HandsView& view);
 
 }  // namespace fulcrum::render

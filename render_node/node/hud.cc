@@ -29,6 +29,10 @@ std::string ForceBar(int tool, float force_N, float limit_N) {
   return bar + Number(" %.1f N", force_N);
 }
 
+const char* NameOf(TubeFlow flow) {
+  return flow == TubeFlow::kAspirates ? " SUCTION" : flow == TubeFlow::kIrrigates ? " IRRIGATION" : "";
+}
+
 std::string InCapitals(std::string_view name) {
   std::string text(name);
   for (char& c : text) c = c == '_' ? ' ' : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
@@ -104,6 +108,11 @@ std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
       texts.push_back({Corner::kTopLeft, ++line, std::string(key)});
     }
   }
+  if (state.help && state.hands && state.tube) {
+    for (const std::string_view key : {"TUBE: HOLD THE JAW: SUCTION", "TWICE, THEN HOLD: IRRIGATION"}) {
+      texts.push_back({Corner::kTopLeft, ++line, std::string(key)});
+    }
+  }
   if (state.help) {
     for (const std::string_view key :
          {"ARROWS TURN", "+ - NEARER, FARTHER", "R T ROLL", "0 RESET VIEW", "L LOCK ON TOOL", "S SCREENSHOT", "P PAUSE",
@@ -118,8 +127,9 @@ std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
   line = 0;
   for (int tool = kMaxTools - 1; tool >= 0; --tool) {
     if (const auto& force_N = state.force_N[static_cast<std::size_t>(tool)]) {
-      texts.push_back(
-          {Corner::kBottomLeft, line++, ForceBar(tool, *force_N, state.force_limit_N), *force_N > state.force_limit_N});
+      const std::string does = NameOf(state.flow[static_cast<std::size_t>(tool)]);
+      texts.push_back({Corner::kBottomLeft, line++, ForceBar(tool, *force_N, state.force_limit_N) + does,
+                       *force_N > state.force_limit_N});
     }
   }
   const char* mode = (state.pedals & kPedalBlend)  ? "BLEND"

@@ -10,6 +10,7 @@
 #include "render_node/scene_graph/overlay.h"
 #include "services/base/core/messages.h"
 #include "services/base/core/scene_view.h"
+#include "services/base/core/suction.h"
 
 namespace fulcrum::render {
 
@@ -20,6 +21,8 @@ struct HudState {
   std::uint8_t pedals = kPedalNone;
   float power_W = 0;                                    ///< Set power of the generator.
   std::array<std::optional<float>, kMaxTools> force_N;  ///< Force of the tissue on each tool; no value without it.
+  std::array<TubeFlow, kMaxTools> flow{};               ///< Of a suction and irrigation tube.
+  bool tube = false;                                    ///< The scene has one.
   float force_limit_N = 1;                              ///< Force that fills the bar; above it the bar is a warning.
   std::optional<float> tip_C;  ///< Hottest texel of the newest patch; no value once the patch is old.
   float slit_m = 0;

@@ -20,20 +20,11 @@
 namespace fulcrum::render {
 namespace {
 
-// Changes of a pose below these limits are not visible: a fifth of a pixel at 10 cm.
-constexpr float kSamePlace = 2e-5f;   // [m]
-constexpr float kSameAngle = 0.002f;  // [rad]
-constexpr float kSameJaw = 0.015f;    // [rad]: a pixel at the tip; above the noise of a handle's potentiometer.
-constexpr float kSameForce = 0.05f;   // [N]: half of the resolution of the displayed figure.
-constexpr float kSameZoom = 0.03f;    // [rad] of the ring: above that noise.
-constexpr float kBoils_C = 90;        // Highest temperature of a patch above which there is steam.
-constexpr float kSameSoil = 0.02f;
+constexpr float kFollowed = 2e-5f;   // [m]: a camera that follows a tool does not move by less.
+constexpr float kSameForce = 0.05f;  // [N]: half of the resolution of the displayed figure.
+constexpr float kBoils_C = 90;       // Highest temperature of a patch above which there is steam.
 constexpr double kTextLife_s = 4.0;  // Duration for which a temperature or a warning is shown.
 constexpr double kLate_s = 0.3;      // Timeout of topics with a rate of 100 Hz.
-
-bool LooksTheSame(const ToolSample& a, const ToolSample& b) {
-  return a.kind == b.kind && (a.p_WT - b.p_WT).norm() < kSamePlace && a.q_WT.angularDistance(b.q_WT) < kSameAngle;
-}
 
 }  // namespace
 
@@ -54,6 +45,7 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
       lens_(scene),
       figures_(scene.render.hud != 0) {
   view_.SetMostScale(quality_.most());
+  hud_.tube = FindTool(scene.tools, ToolKind::kSuction).has_value();
   if (ports_.operator_input == nullptr) return;
   const auto write = [this](const OperatorInput& input) {
     OperatorInput stamped = input;
@@ -93,7 +85,7 @@ void RenderNode::Step(const Tick& tick) {
   if (!ready()) {
     return;
   }
-  if (view_.HazeHasChanged(session_time_s_)) changed_on_screen_ = changed_in_file_ = true;
+  if (view_.HasFaded(session_time_s_)) changed_on_screen_ = changed_in_file_ = true;
   // A new reader receives a picture even if nothing moves.
   const bool streamed = std::exchange(streams_, outlet_.has_readers());
   if (streams_ && !streamed) changed_on_screen_ = true;
@@ -101,14 +93,16 @@ void RenderNode::Step(const Tick& tick) {
   screenshot_ = false;
   if (write || ((window_ || streams_) && changed_on_screen_)) {
     Draw(session_time_s_, write);
+  } else if (view_.TubesWork()) {
+    FollowEffects();
   }
 }
 
 void RenderNode::FollowEffects() {
   if (!ready()) return;
-  const bool cleared = view_.HazeHasChanged(session_time_s_);
+  const bool cleared = view_.HasFaded(session_time_s_);
   if (!view_.UpdateEffects(session_time_s_) && !cleared) return;
-  changed_on_screen_ = true;
+  changed_on_screen_ = changed_in_file_ = true;
   view_.Update();  // Blood runs down the present shape, and steam rises from it.
 }
 
@@ -300,7 +294,7 @@ void RenderNode::TakeKeys() {
   }
   if (followed_ >= 0) {
     const ToolSample& tool = tools_.tools[static_cast<std::size_t>(followed_)];
-    if (tool.kind != ToolKind::kNone && (tool.p_WT - camera_.params().scope_target_W).norm() > kSamePlace) {
+    if (tool.kind != ToolKind::kNone && (tool.p_WT - camera_.params().scope_target_W).norm() > kFollowed) {
       camera_.Follow(tool.p_WT);
       view_.SetCamera(camera_.params());
     }
@@ -322,23 +316,12 @@ void RenderNode::TakeSize() {
 HandsView RenderNode::ViewNow() const { return MakeHandsView(scene_, camera_.params(), shape_.height, tools_); }
 
 PictureHeader RenderNode::HeaderNow() {
-  const HandsView view = ViewNow();
-  PictureHeader header;
+  PictureHeader header = MakePictureHeader(ViewNow());
   header.stamp =
       picture_stamper_.Next(tools_.stamp.stamp_ns != 0 ? tools_.stamp.stamp_ns : tissue_.header.stamp.stamp_ns);
   header.session_time_s = session_time_s_;
   header.tool_sequence = tools_.stamp.sequence;
   header.tissue_sequence = tissue_.header.stamp.sequence;
-  header.eye_W = view.eye;
-  header.right_W = view.right;
-  header.up_W = view.up;
-  header.forward_W = view.forward;
-  header.pixel_rad = view.pixel;
-  header.tip_W = view.tip;
-  for (std::size_t i = 0; i < kMaxTools; ++i) {
-    header.present |= view.present[i] ? 1u << i : 0u;
-    header.scopes |= view.scope[i] ? 1u << i : 0u;
-  }
   header.scale = static_cast<float>(quality_.scale());
   return header;
 }
@@ -381,58 +364,6 @@ void RenderNode::Press(int key) {
       return;
     default:
       return;
-  }
-}
-
-void RenderNode::TakeTools() {
-  if (ports_.tools.TakeLatest(&new_tools_)) {
-    arrivals_[1].time_s = session_time_s_;
-    tools_.stamp = new_tools_.stamp;
-    for (int k = 0; k < kMaxTools; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      if (!LooksTheSame(tools_.tools[i], new_tools_.tools[i])) {
-        tools_.tools[i] = new_tools_.tools[i];
-        view_.SetTool(k, tools_.tools[i]);
-        if (tools_.tools[i].kind == ToolKind::kScope) FollowScope();
-        changed_on_screen_ = changed_in_file_ = true;
-      }
-    }
-  }
-  lens_.Step(session_time_s_, tools_, (contact_.touching || contact_.on_solid) && hud_.power_W > 0);
-  if (std::abs(lens_.soil() - hud_.soil) > kSameSoil || (lens_.soil() == 0 && hud_.soil != 0)) {
-    hud_.soil = lens_.soil();
-    view_.SetSoil(hud_.soil);
-    changed_on_screen_ = changed_in_file_ = true;
-  }
-  if (ports_.handles.TakeLatest(&new_handles_)) {
-    arrivals_[2].time_s = session_time_s_;
-    if (handles_.pedals != new_handles_.pedals) {
-      handles_.pedals = new_handles_.pedals;
-      changed_on_screen_ = changed_in_file_ = true;
-    }
-    for (int k = 0; k < kMaxTools; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      HandleSample& shown = handles_.handles[i];
-      const HandleSample& now = new_handles_.handles[i];
-      const bool scope = scene_.tools[i].kind == ToolKind::kScope;
-      if (now.present && std::abs(now.jaw_angle_rad - shown.jaw_angle_rad) > (scope ? kSameZoom : kSameJaw)) {
-        shown = now;
-        view_.SetJaw(k, now.jaw_angle_rad);
-        if (scope) FollowScope();
-        changed_on_screen_ = changed_in_file_ = true;
-      }
-    }
-  }
-}
-
-void RenderNode::FollowScope() {
-  for (std::size_t i = 0; i < kMaxTools; ++i) {
-    const ToolSample& scope = tools_.tools[i];
-    if (scope.kind != ToolKind::kScope) continue;
-    camera_.Hold(scope.p_WT, SightOf(scope.q_WT, scene_.render.scope_angle_deg),
-                 ZoomAt(handles_.handles[i].jaw_angle_rad));
-    view_.SetCamera(camera_.params());
-    return;
   }
 }
 

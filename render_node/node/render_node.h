@@ -20,6 +20,7 @@
 #include "render_node/node/stage.h"
 #include "services/base/core/lens.h"
 #include "services/base/core/pace.h"
+#include "services/base/core/suction.h"
 #include "services/base/core/tick.h"
 #include "services/base/runtime/histogram.h"
 #include "services/transport/bus/input_account.h"
@@ -109,6 +110,9 @@ class RenderNode {
   void Apply(const TemperaturePatch& patch);
   void TakeThermal();
   void TakeTools();
+  void TakeHandles();
+  /// Lets the valves of tubes follow a sample of the handles.
+  void FollowValves();
   /// The camera of a scene with a scope is where the scope is.
   void FollowScope();
   [[nodiscard]] bool ready() const { return tissue_.header.stamp.sequence != 0; }
@@ -164,6 +168,7 @@ class RenderNode {
   std::map<PatchPlace, TemperaturePatch> held_patches_;  // During a pause.
   ToolState tools_, new_tools_;
   HandleState handles_, new_handles_;
+  std::array<TrumpetValve, kMaxTools> valves_;
   ThermalEvent event_;
   CauteryContact contact_;
   ContactModel contact_model_;

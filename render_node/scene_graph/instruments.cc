@@ -53,6 +53,10 @@ void Instruments::Build(const ToolDescription& tool, Instrument* instrument) {
     instrument->body->addChild(ToGeometry(Hook(shape), "hook"));
     return;
   }
+  if (tool.kind == ToolKind::kSuction) {
+    instrument->body->addChild(ToGeometry(SuctionTube(shape), "tube"));
+    return;
+  }
   instrument->body->addChild(ToGeometry(GrasperShaft(shape), "grasper"));
   const osg::ref_ptr<osg::Geometry> jaw = tool.kind == ToolKind::kScissors ? ToGeometry(ScissorBlade(shape), "blade")
                                                                            : ToGeometry(GrasperJaw(shape), "jaw");

@@ -1,5 +1,7 @@
 #include "render_node/scene_graph/laparoscope_view.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <osg/BlendFunc>
 #include <osg/Depth>
@@ -62,6 +64,7 @@ struct LaparoscopeView::Impl {
   void CastShadows();
   void PlaceEyes();
   void ShineFrom(const Laparoscope& from);
+  [[nodiscard]] std::vector<WorkingTube> Tubes() const;
 
   SceneView scene;
   const Look look;
@@ -76,8 +79,10 @@ struct LaparoscopeView::Impl {
   Mesh shadow_mesh{"shadow", true};
   std::array<ToolSample, kMaxTools> tools{};
   bool tools_moved = true;
+  std::array<TubeFlow, kMaxTools> flows{};
   Smoke smoke;
-  float haze = 0;  // As drawn.
+  float haze = 0;        // As drawn.
+  double effects_s = 0;  // Session time of the last UpdateEffects.
   std::vector<std::uint8_t> serosa = MakeSerosaPattern(kSerosaTexels, look.patterns);
   Bleeding bleeding;
   Overlay overlay;
@@ -101,12 +106,12 @@ LaparoscopeView::Impl::Impl(const SceneView& view, const Look& given)
       eyes(MakeEyes(view.render, view.stereo)),
       atlas(view),
       atlas_texture(atlas),
-      film_texture(atlas.film_width(), atlas.film_height(), atlas.film(), 2),
+      film_texture(atlas.film_width(), atlas.film_height(), atlas.film(), Atlas::kFilmBytes),
       layers(view, eyes),
       surroundings(view, scope, look),
       instruments(view),
       shadow(view),
-      bleeding(view, serosa, kSerosaTexels, kSerosaPerMetre),
+      bleeding(view, serosa, kSerosaTexels, kSerosaPerMetre, layers.rim()),
       overlay(view.stereo.layout, static_cast<int>(view.render.width), static_cast<int>(view.render.height)),
       optics(view.stereo.layout, eyes, static_cast<int>(view.render.width), static_cast<int>(view.render.height),
              surroundings.fixed(), scene_root) {
@@ -270,6 +275,17 @@ void LaparoscopeView::SetJaw(int tool, float angle_rad) {
   impl_->optics.SceneChanged();
 }
 
+void LaparoscopeView::SetFlow(int tool, TubeFlow flow, double session_time_s) {
+  TubeFlow& now = impl_->flows[static_cast<std::size_t>(tool)];
+  if (now == flow) return;
+  (void)UpdateEffects(session_time_s);  // With what the tubes have done so far.
+  now = flow;
+}
+
+bool LaparoscopeView::TubesWork() const {
+  return std::any_of(impl_->flows.begin(), impl_->flows.end(), [](TubeFlow flow) { return flow != TubeFlow::kNone; });
+}
+
 void LaparoscopeView::SetSize(int width, int height) {
   RenderParams& render = impl_->scene.render;
   render.width = static_cast<std::uint32_t>(width);
@@ -326,21 +342,38 @@ void LaparoscopeView::OpenVessels(const Vec2f& material, double session_time_s) 
   impl_->bleeding.Cut(material, impl_->atlas, session_time_s);
 }
 
+std::vector<WorkingTube> LaparoscopeView::Impl::Tubes() const {
+  std::vector<WorkingTube> working;
+  for (std::size_t k = 0; k < flows.size(); ++k) {
+    const ToolSample& tool = tools[k];
+    if (flows[k] == TubeFlow::kNone || tool.kind != ToolKind::kSuction) continue;
+    working.push_back({flows[k], tool.p_WT, tool.q_WT.normalized() * Vec3f::UnitZ(), scene.tools[k].tip_radius_m});
+  }
+  return working;
+}
+
 bool LaparoscopeView::UpdateEffects(double session_time_s) {
+  const std::vector<WorkingTube> tubes = impl_->Tubes();
+  std::vector<Vec3f> sinks;
+  for (const WorkingTube& tube : tubes) {
+    if (tube.flow == TubeFlow::kAspirates) sinks.push_back(tube.tip_W);
+  }
+  impl_->smoke.SetSinks(sinks, impl_->effects_s);
+  impl_->effects_s = session_time_s;
   const bool smoking = impl_->smoke.Update(session_time_s);
   impl_->haze = impl_->smoke.HazeAt(session_time_s);
   impl_->optics.SetHaze(impl_->haze);
-  const bool bled = impl_->bleeding.Update(session_time_s, impl_->layers.membrane(), &impl_->atlas);
+  const bool bled = impl_->bleeding.Update(session_time_s, impl_->layers.membrane(), tubes, &impl_->atlas);
   impl_->film_texture.Update(impl_->atlas.TakeFilmChange());
   const bool changed = smoking || bled;
   if (changed) {
     impl_->optics.SceneChanged();
   }
-  return changed || impl_->bleeding.sources() > 0 || impl_->bleeding.drops() > 0;
+  return changed || impl_->bleeding.moves();
 }
 
-bool LaparoscopeView::HazeHasChanged(double session_time_s) const {
-  return impl_->smoke.HazeAt(session_time_s) != impl_->haze;
+bool LaparoscopeView::HasFaded(double session_time_s) const {
+  return impl_->smoke.HazeAt(session_time_s) != impl_->haze || impl_->bleeding.AgesAt(session_time_s);
 }
 
 const Atlas& LaparoscopeView::atlas() const { return impl_->atlas; }

@@ -11,6 +11,7 @@
 #include "render_node/geometry/solid_burn.h"
 #include "render_node/scene_graph/overlay.h"
 #include "services/base/core/scene_view.h"
+#include "services/base/core/suction.h"
 
 namespace fulcrum::render {
 
@@ -32,6 +33,10 @@ class LaparoscopeView {
   bool ApplyPatch(const TemperaturePatch& patch);
   void SetTool(int tool, const ToolSample& sample);
   void SetJaw(int tool, float angle_rad);
+  /// What a suction and irrigation tube does from this time on.
+  void SetFlow(int tool, TubeFlow flow, double session_time_s);
+  /// A tube aspirates or irrigates: UpdateEffects must be called at each step, so that poses count when they come.
+  [[nodiscard]] bool TubesWork() const;
 
   /// Sets the text in the corners.
   void SetTexts(std::span<const OverlayText> texts);
@@ -45,8 +50,8 @@ class LaparoscopeView {
   void RehearseBurn(bool on);
   /// Advances smoke and blood. Returns true if the picture changes or will change by that, but for the haze.
   bool UpdateEffects(double session_time_s);
-  /// True if the haze of smoke is no longer that of the last UpdateEffects.
-  [[nodiscard]] bool HazeHasChanged(double session_time_s) const;
+  /// True if the haze of smoke or the age of clots is no longer that of the last UpdateEffects.
+  [[nodiscard]] bool HasFaded(double session_time_s) const;
 
   /// Size of the picture [pixels], of the scene's aspect but for rounding.
   void SetSize(int width, int height);

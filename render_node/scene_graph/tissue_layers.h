@@ -45,6 +45,7 @@ class TissueLayers {
   bool Update();
 
   [[nodiscard]] const MembraneMesh& membrane() const { return membrane_; }
+  [[nodiscard]] std::span<const float> rim() const { return rim_; }  ///< Of SheetRim().
   [[nodiscard]] const BurnAtlas& burn_atlas() const { return burn_.atlas(); }
   [[nodiscard]] std::span<const float> particles() const { return xyz_; }  ///< Last argument of SetTissue.
   [[nodiscard]] osg::Geode* node() const { return geode_; }

@@ -49,7 +49,8 @@ vec3 AroundTheSheet(vec3 colour, float fat, vec4 noise) {
   return mix(colour * (0.6 + 0.8 * noise.r), vec3(0.80, 0.46, 0.16), fat * smoothstep(0.35, 0.95, noise.g));
 }
 
-// The film on the sheet (geometry/atlas.h): thickness of the blood, nearness of removed tissue.
+// The film on the sheet (geometry/atlas.h): thickness of blood and clot, nearness of removed tissue, clot, water. Blood
+// of 0.3 mm has the thickness 1 here: 7.6 lengths of absorption of green light, as haemoglobin of 150 g/l has.
 uniform sampler2D film_map;
 uniform vec2 film_per_metre; // Coordinates of film_map per metre of material.
 

@@ -112,14 +112,20 @@ void main() {
   vec3 seam = mix(vec3(0.44, 0.22, 0.09), vec3(0.16, 0.060, 0.022), brown);
   albedo = mix(albedo, mix(vec3(0.84, 0.64, 0.50), seam, smoothstep(0.80, 0.97, edge + 0.35 * bend.z)), 0.8 * lip);
   alpha = mix(alpha, 0.90, lip);
-  // Blood lies on top and seeps away where the sheet ends.
-  float blood = wet_film.r * (1.0 - smoothstep(0.5, 0.95, abs(coordinate.w)));
+  // Blood lies on top, and seeps away where the sheet ends on the organ. A clot is darker and duller.
+  float blood = 2.0 * wet_film.r * (1.0 - (coordinate.w < 0.0 ? smoothstep(0.5, 0.95, -coordinate.w) : smoothstep(0.93, 1.0, coordinate.w)));
   float bloody = smoothstep(0.0, 0.35, blood);
-  albedo = ThroughBlood(albedo, blood);
+  float clot = bloody * smoothstep(0.15, 0.9, wet_film.b / (wet_film.r + 0.02));
+  albedo = mix(ThroughBlood(albedo, blood), vec3(0.050, 0.006, 0.007) * (0.5 + noise.b), 0.85 * clot);
   alpha = mix(alpha, 0.97, bloody);
-  film = normalize(mix(film, normal + 0.5 * bend, bloody));
+  film = normalize(mix(film, normal + (0.5 + 0.6 * clot) * bend, bloody));
 
-  float wet = mix(1.6 * (1.0 - 0.92 * max(brown, 0.3 * pale)), 1.8, bloody);
+  float wet = mix(1.6 * (1.0 - 0.92 * max(brown, 0.3 * pale)), 1.8 - 1.0 * clot, bloody);
+  // Water darkens a little, and is smoother than the tissue's own film.
+  float rinsed = smoothstep(0.0, 0.25, wet_film.a);
+  albedo *= 1.0 - 0.12 * rinsed;
+  film = normalize(mix(film, normal + 0.35 * bend, rinsed));
+  wet += 0.7 * rinsed;
 
   // The fascia's fibres run obliquely across the organ with varying density; burns of the peritoneum apply to them as
   // well.

@@ -29,5 +29,18 @@ TEST(Hud, NamesTheGamepadsButtonsAsTheCartAssignsThemWhileOneIsPluggedIn) {
   EXPECT_TRUE(Says(state, "CLICK OR ENTER: TAKE THE TOOLS"));
 }
 
+TEST(Hud, SaysWhatATubeDoesAndHow) {
+  HudState state;
+  state.force_N[1] = 0.0f;
+  state.flow[1] = TubeFlow::kIrrigates;
+  const auto texts = HudTexts(state, true);
+  EXPECT_TRUE(std::ranges::any_of(texts, [](const OverlayText& line) { return line.text.ends_with(" IRRIGATION"); }));
+  state.help = true;
+  state.hands = HandsState();
+  EXPECT_FALSE(Says(state, "TUBE: HOLD THE JAW: SUCTION"));
+  state.tube = true;
+  EXPECT_TRUE(Says(state, "TUBE: HOLD THE JAW: SUCTION"));
+}
+
 }  // namespace
 }  // namespace fulcrum::render

@@ -244,6 +244,48 @@ TEST_F(RenderNodeTest, ThePictureIsThatOfTheHeldScope) {
   EXPECT_NEAR(picture.header.pixel_rad, wide / 2, 1e-3f * wide) << "zoomed twice";
 }
 
+TEST_F(RenderNodeTest, ATubeIrrigatesAtTheSecondSqueezeAlsoWhenNoPictureIsDrawn) {
+  view_.tools[2] = view_.tools[0];
+  view_.tools[2].kind = ToolKind::kSuction;
+  const auto node = MakeNode();
+  SyntheticMoment moment = MakeSyntheticMoment(view_, 1.0);
+  ToolSample& tube = moment.tools.tools[2];
+  tube.kind = ToolKind::kSuction;
+  const Vec2f place = view_.membrane_material[view_.membrane.rows / 2 * view_.membrane.cols + view_.membrane.cols / 2];
+  Publish(moment);
+  node->Step(At(1.0));
+  tube.p_WT = node->view().OnMembrane(place) + Vec3f(0, 0, 0.005f);
+  tube.q_WT = Quatf(Eigen::AngleAxisf(3.14159f, Vec3f::UnitX()));  // Downwards.
+  moment.tools.stamp.sequence += 1;
+  Publish(moment);
+  node->Step(At(1.05));
+  const auto water = [&] {
+    const Atlas& atlas = node->view().atlas();
+    int wet = 0;
+    for (std::size_t k = 3; k < atlas.film().size(); k += Atlas::kFilmBytes) wet += atlas.film()[k] > 0 ? 1 : 0;
+    return wet;
+  };
+  // Both squeezes come between two steps.
+  const auto squeeze = [&](double time_s, float jaw_rad) {
+    moment.handles.handles[2] = {.present = true, .jaw_angle_rad = jaw_rad};
+    Stamped(&moment.handles.stamp);
+    moment.handles.stamp.stamp_ns = static_cast<std::int64_t>(1e9 * time_s);
+    bus_.handles_out->Write(moment.handles);
+  };
+  squeeze(1.1, 0);
+  squeeze(1.2, 0.7f);
+  node->Step(At(1.25));
+  EXPECT_EQ(water(), 0) << "one squeeze aspirates";
+  squeeze(3.1, 0);
+  squeeze(3.2, 0.7f);
+  squeeze(3.3, 0);
+  const std::uint64_t drawn = node->pictures_drawn();
+  node->Step(At(3.35));
+  for (int k = 1; k <= 5; ++k) node->Step(At(3.35 + 0.02 * k));
+  EXPECT_GT(water(), 100);
+  EXPECT_LE(node->pictures_drawn(), drawn + 1);
+}
+
 TEST(JpegEncoder, KeepsThePictureAndTheLimit) {
   Bitmap picture{64, 48, std::vector<std::uint8_t>(3 * 64 * 48)};
   // Red above, blue beneath; the first row is the bottom one.

@@ -1,6 +1,9 @@
 // Draws a picture for a developer without the cart:
 //
-//   render_preview built-in|small|FILE.scene TIME_s OUT.png [TIP_x TIP_y TIP_z TARGET_x TARGET_y TARGET_z]
+//   render_preview built-in|small|FILE.scene TIME_s OUT.png [TIP_x TIP_y TIP_z TARGET_x TARGET_y TARGET_z [BLEEDS_s]]
+//
+// With BLEEDS_s the cut has been made without coagulation so long ago, and a tube whose handle the script closes has
+// aspirated for the last second.
 #include <cstdlib>
 #include <iostream>
 #include <memory>
@@ -41,7 +44,11 @@ int main(int argc, char** argv) {
     const auto display = render::MakeOffscreenDisplay(laparoscope, view.render);
     laparoscope.SetTissue(moment.tissue.xyz);
     laparoscope.SetTopology(moment.topology);
-    for (const TemperaturePatch& patch : moment.patches) {
+    const double bleeds_s = argc >= 11 ? std::strtod(argv[10], nullptr) : 0;
+    for (TemperaturePatch patch : moment.patches) {
+      for (std::size_t k = 0; bleeds_s > 0 && k < patch.texels.size(); k += 4) {
+        patch.texels[k + 1] = patch.texels[k + 2] = 0;
+      }
       laparoscope.ApplyPatch(patch);
     }
     for (int tool = 0; tool < kMaxTools; ++tool) {
@@ -49,6 +56,18 @@ int main(int argc, char** argv) {
       laparoscope.SetJaw(tool, moment.handles.handles[static_cast<std::size_t>(tool)].jaw_angle_rad);
     }
     laparoscope.Update();
+    for (const Vec2f& place : moment.cut_path) {
+      if (bleeds_s > 0) laparoscope.OpenVessels(place, 0);
+    }
+    for (double time_s = 0.1; time_s < bleeds_s; time_s += 0.1) {
+      for (int tool = 0; time_s > bleeds_s - 1 && tool < kMaxTools; ++tool) {
+        const auto k = static_cast<std::size_t>(tool);
+        if (view.tools[k].kind != ToolKind::kSuction) continue;
+        TrumpetValve valve;
+        laparoscope.SetFlow(tool, valve.Step(time_s, moment.handles.handles[k].jaw_angle_rad), time_s);
+      }
+      (void)laparoscope.UpdateEffects(time_s);
+    }
     render::Bitmap picture;
     display->DrawAndRead(&picture);
     render::WritePng(picture, argv[3]);

@@ -41,5 +41,40 @@ TEST(SmokeTest, HazeChangesInStepsSoThatFewPicturesFollow) {
   EXPECT_LE(steps, 16);
 }
 
+TEST(SmokeTest, SuctionHalvesTheTimeInWhichTheHazeClears) {
+  Smoke left, drawn;
+  const Vec3f sink(1, 0, 0);  // Far from the puffs.
+  for (int k = 0; k < 100; ++k) {
+    left.Add(Vec3f::Zero(), kAPuff_s * k);
+    drawn.Add(Vec3f::Zero(), kAPuff_s * k);
+  }
+  drawn.SetSinks({&sink, 1}, 10);
+  EXPECT_EQ(drawn.HazeAt(10), left.HazeAt(10));
+  // 20 l/min through 3 l is a time constant of 9 s, beside that of 6 s.
+  EXPECT_NEAR(drawn.HazeAt(10 + 3.6), left.HazeAt(10 + 6), 1.01f / 64);
+  drawn.SetSinks({}, 13.6);
+  EXPECT_NEAR(drawn.HazeAt(13.6 + 4), left.HazeAt(16 + 4), 1.01f / 64);
+}
+
+TEST(SmokeTest, APuffIsDrawnIntoTheTubeHoweverOftenItIsShown) {
+  const auto squares = [](double step_s, bool sucks) {
+    Smoke smoke;
+    smoke.Add(Vec3f::Zero(), 1.0);
+    smoke.Update(1.0);
+    const Vec3f sink(0, 0.012f, 0.004f);
+    if (sucks) smoke.SetSinks({&sink, 1}, 1.0);
+    bool visible = true;
+    for (int k = 1; k * step_s < 1.0001; ++k) {
+      smoke.Update(1.0 + k * step_s);
+      visible =
+          smoke.geometry()->getNumPrimitiveSets() > 0 && smoke.geometry()->getPrimitiveSet(0)->getNumIndices() > 0;
+    }
+    return visible;
+  };
+  EXPECT_TRUE(squares(0.1, false));
+  EXPECT_FALSE(squares(0.1, true));
+  EXPECT_FALSE(squares(0.5, true));
+}
+
 }  // namespace
 }  // namespace fulcrum::render

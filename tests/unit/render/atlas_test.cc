@@ -100,9 +100,10 @@ TEST_F(AtlasTest, TheFilmTellsHowNearRemovedTissueIs) {
   for (std::size_t k = 3; k < patch.texels.size(); k += 4) patch.texels[k] = 255;
   patch.texels[4 * (20 * kPatchTexels + 20) + 3] = 0;
   const auto rim = [&](int x, int y) {
-    return atlas_.film()[2 * (static_cast<std::size_t>(y / 2) * static_cast<std::size_t>(atlas_.film_width()) +
-                              static_cast<std::size_t>(x / 2)) +
-                         1];
+    return atlas_
+        .film()[Atlas::kFilmBytes * (static_cast<std::size_t>(y / 2) * static_cast<std::size_t>(atlas_.film_width()) +
+                                     static_cast<std::size_t>(x / 2)) +
+                1];
   };
   atlas_.Apply(patch);
   EXPECT_GT(rim(52, 84), 235);
@@ -118,12 +119,15 @@ TEST_F(AtlasTest, TheFilmTellsHowNearRemovedTissueIs) {
 
 TEST_F(AtlasTest, BloodIsIndependentOfPatches) {
   const Vec2f place(0.005f, 0.008f);
-  EXPECT_TRUE(atlas_.Stain(place, 0.001f, 1));
-  EXPECT_NEAR(atlas_.Blood(place), 1, 0.05f);
+  const int x = static_cast<int>(place.x() / (2 * atlas_.texel_m())),
+            y = static_cast<int>(place.y() / (2 * atlas_.texel_m()));
+  EXPECT_TRUE(atlas_.SetLiquid(x, y, 255, 20, 30));
+  EXPECT_FALSE(atlas_.SetLiquid(x, y, 255, 20, 30)) << "nothing new";
+  EXPECT_EQ(atlas_.Blood(place), 1);
   EXPECT_EQ(atlas_.Blood(place + Vec2f(0.0013f, 0)), 0);
   atlas_.Apply(PatchAt(32, 64, 99));
-  EXPECT_NEAR(atlas_.Blood(place), 1, 0.05f);
-  EXPECT_FALSE(atlas_.Stain(Vec2f(-1, -1), 0.001f, 1)) << "beside the sheet";
+  EXPECT_EQ(atlas_.Blood(place), 1);
+  EXPECT_EQ(atlas_.Blood(Vec2f(-1, -1)), 0) << "beside the sheet";
 }
 
 TEST_F(AtlasTest, WhatAPatchSaidIsNotPaintedOver) {

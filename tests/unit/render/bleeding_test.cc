@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "render_node/geometry/sheet_rim.h"
 #include "services/scene/builder/build.h"
 
 namespace fulcrum::render {
@@ -35,7 +36,7 @@ class BleedingTest : public testing::Test {
 
   int Stained() const {
     int count = 0;
-    for (std::size_t k = 0; k < atlas_.film().size(); k += 2) {
+    for (std::size_t k = 0; k < atlas_.film().size(); k += Atlas::kFilmBytes) {
       count += atlas_.film()[k] != 0 ? 1 : 0;
     }
     return count;
@@ -54,12 +55,12 @@ TEST_F(BleedingTest, AnOpenedVesselStainsTheSheetDownhill) {
   Bleeding bleeding(view_, vessels_, 1, 16);
   bleeding.Cut(place_, atlas_, 1.0);
   ASSERT_EQ(bleeding.sources(), 1);
-  EXPECT_TRUE(bleeding.Update(1.1, membrane_, &atlas_));
+  EXPECT_TRUE(bleeding.Update(1.1, membrane_, {}, &atlas_));
   const int first = Stained();
   EXPECT_GT(first, 0);
   Vec2f centre = Vec2f::Zero();
   for (double t = 1.2; t < 4; t += 0.1) {
-    bleeding.Update(t, membrane_, &atlas_);
+    bleeding.Update(t, membrane_, {}, &atlas_);
   }
   EXPECT_GT(Stained(), 2 * first);
   int count = 0;
@@ -85,51 +86,59 @@ TEST_F(BleedingTest, AnOpenedVesselStainsTheSheetDownhill) {
   EXPECT_LT(height(centre), height(place_));
 }
 
-TEST_F(BleedingTest, GathersWhereItStops) {
-  Bleeding bleeding(view_, vessels_, 1, 16);
+TEST_F(BleedingTest, RunsToTheSideAndGathersThere) {
+  const std::vector<float> rim = SheetRim(view_);
+  Bleeding bleeding(view_, vessels_, 1, 16, rim);
   place_ = view_.membrane_material[view_.membrane.rows / 2 * view_.membrane.cols + view_.membrane.cols / 2 + 1];
   bleeding.Cut(place_, atlas_, 1.0);
-  for (double t = 1.1; t < 40; t += 0.1) bleeding.Update(t, membrane_, &atlas_);
-  // Half of the thickest places lie at the source, the others at the end of the run; between them the film is thin.
-  float farthest = 0, thinnest = 1;
-  for (int y = 0; y < atlas_.height(); y += 2) {
-    float thickest = 0, away = 0;
-    for (int x = 0; x < atlas_.width(); x += 2) {
-      const Vec2f place = atlas_.texel_m() * Vec2f(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
-      const float blood = atlas_.Blood(place);
-      thickest = std::max(thickest, blood);
-      if (blood > 0.9f) away = std::max(away, (place - place_).norm());
+  for (double t = 1.1; t < 40; t += 0.1) bleeding.Update(t, membrane_, {}, &atlas_);
+  // A film all the way from the source, and the deepest place at the lower side of the sheet.
+  float deepest = 0, away = 0, thinnest = 1;
+  for (float s = place_.x(); s < static_cast<float>(atlas_.width()) * atlas_.texel_m(); s += 4e-4f) {
+    float thickest = 0;
+    for (float t = place_.y() - 0.02f; t < place_.y() + 0.02f; t += 4e-4f) {
+      thickest = std::max(thickest, bleeding.fluid().At({s, t}).liquid());
     }
-    farthest = std::max(farthest, away);
-    if (thickest > 0) thinnest = std::min(thinnest, thickest);
+    if (thickest == 0) break;
+    thinnest = std::min(thinnest, thickest);
+    if (thickest > deepest) away = s - place_.x();
+    deepest = std::max(deepest, thickest);
   }
-  EXPECT_GT(farthest, 0.012f);
-  EXPECT_LT(thinnest, 0.6f);
+  EXPECT_GT(away, 0.015f);
+  EXPECT_GT(deepest, 1e-3f);
+  EXPECT_GT(thinnest, 2e-5f);
+  EXPECT_LT(thinnest, 2e-4f);
+  const SheetFluid::Balance blood = bleeding.fluid().blood();
+  EXPECT_GT(bleeding.shed_m3(), 150e-9);
+  EXPECT_NEAR(blood.sum(), bleeding.shed_m3(), 1e-4 * bleeding.shed_m3());
+  EXPECT_EQ(blood.ran_off, 0);
 }
 
 TEST_F(BleedingTest, HeatSealsIt) {
   Bleeding bleeding(view_, vessels_, 1, 16);
   bleeding.Cut(place_, atlas_, 1.0);
-  bleeding.Update(1.5, membrane_, &atlas_);
+  bleeding.Update(1.5, membrane_, {}, &atlas_);
   EXPECT_EQ(bleeding.sources(), 1);
   Heat(200);
-  bleeding.Update(1.6, membrane_, &atlas_);
+  bleeding.Update(1.6, membrane_, {}, &atlas_);
   EXPECT_EQ(bleeding.sources(), 0);
-  for (double t = 1.7; t < 30; t += 0.2) {
-    bleeding.Update(t, membrane_, &atlas_);
-  }
-  EXPECT_EQ(bleeding.drops(), 0) << "drops that have left run out";
+  double t = 1.7;
+  for (; t < 300; t += 0.2) bleeding.Update(t, membrane_, {}, &atlas_);
+  EXPECT_FALSE(bleeding.moves()) << "what has left comes to rest";
   const int stained = Stained();
-  EXPECT_FALSE(bleeding.Update(31, membrane_, &atlas_));
+  EXPECT_GT(stained, 0);
+  for (; t < 700; t += 0.2) bleeding.Update(t, membrane_, {}, &atlas_);
+  EXPECT_FALSE(bleeding.AgesAt(t + 10)) << "and clots";
+  EXPECT_FALSE(bleeding.Update(t + 0.2, membrane_, {}, &atlas_));
   EXPECT_EQ(Stained(), stained) << "the stains remain";
 }
 
 TEST_F(BleedingTest, ASmallVesselClosesByItself) {
   Bleeding bleeding(view_, vessels_, 1, 16);
   bleeding.Cut(place_, atlas_, 1.0);
-  for (double t = 1.1; t < 8.5; t += 0.1) bleeding.Update(t, membrane_, &atlas_);
+  for (double t = 1.1; t < 8.5; t += 0.1) bleeding.Update(t, membrane_, {}, &atlas_);
   EXPECT_EQ(bleeding.sources(), 1);
-  for (double t = 8.5; t < 9.5; t += 0.1) bleeding.Update(t, membrane_, &atlas_);
+  for (double t = 8.5; t < 9.5; t += 0.1) bleeding.Update(t, membrane_, {}, &atlas_);
   EXPECT_EQ(bleeding.sources(), 0);
 }
 
@@ -143,6 +152,17 @@ TEST_F(BleedingTest, ACoagulatedOrBloodlessPlaceDoesNotBleed) {
   EXPECT_EQ(bleeding.sources(), 0);
 }
 
+TEST_F(BleedingTest, NothingIsComputedWithoutBlood) {
+  Bleeding bleeding(view_, vessels_, 1, 16);
+  EXPECT_FALSE(bleeding.Update(100, membrane_, {}, &atlas_));
+  EXPECT_FALSE(bleeding.moves());
+  EXPECT_FALSE(bleeding.AgesAt(1e6));
+  bleeding.Cut(place_, atlas_, 100);
+  bleeding.Update(100.2, membrane_, {}, &atlas_);
+  EXPECT_GT(bleeding.shed_m3(), 0.2 * 20e-9) << "with the first pulse";
+  EXPECT_LT(bleeding.shed_m3(), 0.3 * 20e-9) << "time begins at the cut";
+}
+
 TEST_F(BleedingTest, IsBoundedAndDoesNotDependOnHowOftenItIsDrawn) {
   const auto run = [&](double step) {
     Atlas atlas(view_);
@@ -150,10 +170,13 @@ TEST_F(BleedingTest, IsBoundedAndDoesNotDependOnHowOftenItIsDrawn) {
     for (const Vec2f& m : view_.membrane_material) {
       bleeding.Cut(m, atlas, 1.0);
     }
+    const Vec3f tip = membrane_.positions()[view_.membrane.rows / 2 * view_.membrane.cols + view_.membrane.cols / 2];
+    const std::array<WorkingTube, 2> tubes{
+        WorkingTube{TubeFlow::kAspirates, tip, -Vec3f::UnitZ(), 0.0025f},
+        {TubeFlow::kIrrigates, tip + Vec3f(0, 0.02f, 0.01f), -Vec3f::UnitZ(), 0.0025f}};
     for (int k = 1; k * step < 8.0001; ++k) {
-      bleeding.Update(1.0 + k * step, membrane_, &atlas);
+      bleeding.Update(1.0 + k * step, membrane_, tubes, &atlas);
       EXPECT_LE(bleeding.sources(), 8);
-      EXPECT_LE(bleeding.drops(), 48);
     }
     return std::vector<std::uint8_t>(atlas.film().begin(), atlas.film().end());
   };
