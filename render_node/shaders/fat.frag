@@ -32,7 +32,8 @@ void main() {
   // The coarse noise distorts the coordinates of the lobules, so that no two are alike.
   vec4 fat = texture(fat_pattern, m * 36.0 + 0.35 * broad.rg);
   vec4 heat = texture(atlas, m * atlas_per_metre);
-  float blood = texture(film_map, m * film_per_metre).r;
+  vec4 liquid = texture(film_map, m * film_per_metre);
+  float blood = 2.0 * liquid.r;
   float opened = max(heat.a < 0.5 ? 1.0 : 0.0, smoothstep(0.2, 0.8, coordinate.w));
 
   // Directions of s and t on the surface, for the slope of the lobules. Where it is seen edge on they cannot be found.
@@ -69,7 +70,7 @@ void main() {
   // Under a burn the fat is seared as well, least in the open middle of the slit.
   float dry = clamp(2.0 * heat.b, 0.0, 1.0);
   albedo *= mix(vec3(1.0), vec3(0.62, 0.42, 0.28), (heat.a < 0.5 ? 0.35 : 0.7) * dry);
-  albedo = ThroughBlood(albedo, blood);
+  albedo = mix(ThroughBlood(albedo, blood), kClot, 0.85 * ClotShare(liquid));
   alpha = mix(alpha, 0.97, smoothstep(0.0, 0.3, blood));
 #endif
   float gloss;

@@ -61,6 +61,10 @@ vec3 ThroughBlood(vec3 albedo, float thickness) {
   return albedo * passed + (1.0 - passed.g) * vec3(0.060, 0.004, 0.004);
 }
 
+// Share of a clot in a sample of the film map, for its colour.
+const vec3 kClot = vec3(0.050, 0.006, 0.007);
+float ClotShare(vec4 film) { return smoothstep(0.15, 0.9, film.b / (film.r + 0.02)); }
+
 // Metal: it reflects the lit cavity, red below and dark towards the scope.
 vec3 ShadeMetal(vec3 tint, vec3 normal, vec3 position) {
   vec3 l;

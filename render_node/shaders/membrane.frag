@@ -115,8 +115,8 @@ void main() {
   // Blood lies on top, and seeps away where the sheet ends on the organ. A clot is darker and duller.
   float blood = 2.0 * wet_film.r * (1.0 - (coordinate.w < 0.0 ? smoothstep(0.5, 0.95, -coordinate.w) : smoothstep(0.93, 1.0, coordinate.w)));
   float bloody = smoothstep(0.0, 0.35, blood);
-  float clot = bloody * smoothstep(0.15, 0.9, wet_film.b / (wet_film.r + 0.02));
-  albedo = mix(ThroughBlood(albedo, blood), vec3(0.050, 0.006, 0.007) * (0.5 + noise.b), 0.85 * clot);
+  float clot = bloody * ClotShare(wet_film);
+  albedo = mix(ThroughBlood(albedo, blood), kClot * (0.5 + noise.b), 0.85 * clot);
   alpha = mix(alpha, 0.97, bloody);
   film = normalize(mix(film, normal + (0.5 + 0.6 * clot) * bend, bloody));
 
