@@ -1,9 +1,13 @@
 // render_node: draws the picture of the laparoscope, into a window (--window) or off screen into PNG files.
+#include <cstdio>
+#include <exception>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "render_node/node/drawing_threads.h"
 #include "render_node/node/render_node.h"
+#include "render_node/offscreen/egl_context.h"
 #include "services/base/runtime/realtime.h"
 #include "services/nodes/app/node_app.h"
 #include "services/nodes/app/spare.h"
@@ -52,9 +56,24 @@ ExitCode RunRender(app::NodeApp& app) {
   return code;
 }
 
+/// What would draw off screen in a session, for `fulcrum doctor`.
+ExitCode PrintGraphics() {
+  try {
+    std::puts(render::EglContext().description().c_str());
+    return ExitCode::kDone;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return ExitCode::kFailure;
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  return app::NodeMain(argc, argv, NodeId::kRender,
-                       "Draws what the laparoscope sees: off screen into PNG files, or --window.", RunRender);
+  if (argc == 2 && std::string_view(argv[1]) == "--graphics") return static_cast<int>(PrintGraphics());
+  return app::NodeMain(
+      argc, argv, NodeId::kRender,
+      "Draws what the laparoscope sees: off screen into PNG files, or --window. --graphics alone prints "
+      "what draws off screen.",
+      RunRender);
 }

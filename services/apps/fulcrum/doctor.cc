@@ -1,6 +1,4 @@
 // fulcrum doctor: each check of the machine prints ✓ or ✗ with its finding, and for ✗ a fix.
-#include <EGL/egl.h>
-#include <EGL/eglext.h>
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/socket.h>
@@ -9,10 +7,12 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <optional>
 #include <sstream>
 #include <thread>
 
@@ -20,6 +20,8 @@
 #include "services/apps/fulcrum/security_report.h"
 #include "services/base/config/cart.h"
 #include "services/base/core/error.h"
+#include "services/base/runtime/child_process.h"
+#include "services/base/runtime/file_descriptor.h"
 #include "services/base/runtime/install_places.h"
 #include "services/base/runtime/realtime.h"
 #include "services/session/supervisor/domain_guard.h"
@@ -105,29 +107,40 @@ Finding LockedMemory() {
           FixOfLimit("memlock unlimited", "IPC_LOCK")};
 }
 
-// EGL is loaded at run time, so that a machine without it gets a diagnosis instead of a loader error.
+/// What draws pictures off screen, as render_node chooses it in a session. Asked in a process of its own, because this
+/// program must also run on a machine without EGL.
 Finding OffScreenGl() {
   const std::string fix = "apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri";
-  void* library = ::dlopen("libEGL.so.1", RTLD_NOW);
-  if (library == nullptr) {
-    return {false, "libEGL.so.1 is missing", fix};
+  int ends[2];
+  if (::pipe2(ends, O_CLOEXEC) != 0) {
+    return {false, std::string("no pipe: ") + std::strerror(errno), fix};
   }
-  const auto get_proc = reinterpret_cast<decltype(&eglGetProcAddress)>(::dlsym(library, "eglGetProcAddress"));
-  const auto initialize = reinterpret_cast<decltype(&eglInitialize)>(::dlsym(library, "eglInitialize"));
-  const auto query = reinterpret_cast<decltype(&eglQueryString)>(::dlsym(library, "eglQueryString"));
-  const auto get_display = reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(
-      get_proc != nullptr ? get_proc("eglGetPlatformDisplayEXT") : nullptr);
-  if (get_display == nullptr || initialize == nullptr || query == nullptr) {
-    return {false, "this EGL has no surfaceless platform", fix};
+  const runtime::FileDescriptor said(ends[0]);
+  runtime::FileDescriptor output(ends[1]);
+  runtime::ChildProcess renderer;
+  try {
+    renderer = runtime::ChildProcess::StartOn(runtime::ProgramFolder() / "render_node", {"--graphics"},
+                                              {.output = output.get()});
+  } catch (const InputError& error) {
+    return {false, error.what(), fix};
   }
-  const EGLDisplay display = get_display(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
-  EGLint major = 0, minor = 0;
-  if (display == EGL_NO_DISPLAY || initialize(display, &major, &minor) == EGL_FALSE) {
-    return {false, "EGL cannot open a surfaceless display", fix};
+  output.Close();  // Only the child writes, so reading ends with it.
+  std::string text;
+  char part[512];
+  for (ssize_t count = 0; (count = ::read(said.get(), part, sizeof(part))) > 0;) {
+    text.append(part, static_cast<std::size_t>(count));
   }
-  const char* vendor = query(display, EGL_VENDOR);
-  return {true,
-          "EGL " + std::to_string(major) + "." + std::to_string(minor) + ", " + (vendor != nullptr ? vendor : "?"), ""};
+  std::optional<runtime::ProcessEnd> end;
+  while (!(end = renderer.Poll())) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  // The answer is the last line; a driver may have written warnings before it.
+  text.erase(text.find_last_not_of('\n') + 1);
+  text.erase(0, text.rfind('\n') + 1);
+  if (end->signal != 0 || end->exit_code != 0) {
+    return {false, text.empty() ? "render_node " + end->Describe() : text, fix};
+  }
+  return {true, "pictures are drawn by " + text, ""};
 }
 
 Finding Display() {

@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <string>
 
+#include "render_node/offscreen/egl_context.h"
 #include "services/base/core/exit_code.h"
 #include "services/scene/builder/build.h"
 #include "tests/integration/render/synthetic_scene.h"
@@ -59,6 +60,21 @@ TEST_F(NodeCommand, WithoutOpenGlItSaysWhatToInstall) {
   EXPECT_EQ(outcome.exit_code, static_cast<int>(ExitCode::kFailure)) << outcome.text;
   EXPECT_NE(outcome.text.find("no OpenGL off screen"), std::string::npos) << outcome.text;
   EXPECT_NE(outcome.text.find("libegl-mesa0"), std::string::npos) << outcome.text;
+}
+
+TEST(DoctorTest, NamesWhatDrawsThePicture) {
+  const Outcome graphics = RunCommand(FULCRUM_BIN_DIR "/render_node --graphics");
+  ASSERT_EQ(graphics.exit_code, static_cast<int>(ExitCode::kDone)) << graphics.text;
+  EXPECT_EQ(EglContext().description() + "\n", graphics.text);
+  const Outcome doctor = RunCommand(FULCRUM_BIN_DIR "/fulcrum doctor --domain 31");
+  EXPECT_NE(doctor.text.find("pictures are drawn by " + graphics.text), std::string::npos) << doctor.text;
+}
+
+TEST(DoctorTest, SaysWhatToInstallWithoutOpenGl) {
+  const Outcome doctor =
+      RunCommand("env __EGL_VENDOR_LIBRARY_FILENAMES=/nonexistent " FULCRUM_BIN_DIR "/fulcrum doctor --domain 31");
+  EXPECT_EQ(doctor.exit_code, static_cast<int>(ExitCode::kFailure)) << doctor.text;
+  EXPECT_NE(doctor.text.find("✗ off-screen GL       no OpenGL off screen"), std::string::npos) << doctor.text;
 }
 
 TEST_F(NodeCommand, AWindowWithoutADisplayIsRefused) {
