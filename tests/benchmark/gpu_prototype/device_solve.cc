@@ -12,6 +12,9 @@ using implicit::kMatrixFloats;
 using implicit::kStressFloats;
 using implicit::kVertexFloats;
 
+/// Of the kernels SheetTriangles and SheetLinearise.
+constexpr std::size_t kTrianglePlanes = 18, kCouplingPlanes = 6, kLinearisedPlanes = 15;
+
 std::string ReadKernels() {
   const std::string file = std::string(FULCRUM_SOURCE_DIR) + "/tests/benchmark/gpu_prototype/kernels.cl";
   std::ifstream in(file);
@@ -88,6 +91,7 @@ DeviceSolve::DeviceSolve(Device* device, HostCase* host, Rounding rounding)
   sheet_partial_ = device_.Make(sizeof(double) * sheet_sums_.size());
   organ_partial_ = device_.Make(sizeof(double) * organ_sums_.size());
 
+  CopyLaw(system.sheet);
   r_ = device_.MakeFrom(std::vector<float>(field_, 0.0f));
   z_ = device_.MakeFrom(std::vector<float>(field_, 0.0f));
   p_ = device_.MakeFrom(std::vector<float>(field_, 0.0f));
@@ -98,6 +102,41 @@ DeviceSolve::DeviceSolve(Device* device, HostCase* host, Rounding rounding)
   sheet_dots_ = device_.Make(sizeof(float) * plane_);
   organ_dots_ = device_.Make(sizeof(float) * vertices_);
   lanes_ = device_.Make(sizeof(float) * kLanes * rows_);
+}
+
+/// What the linearisation reads.
+void DeviceSolve::CopyLaw(const implicit::Sheet& sheet) {
+  std::vector<float> planes;
+  for (const float* a : sheet.triangle) Append(a, plane_, &planes);
+  for (const auto& half : sheet.trace) {
+    for (const float* alpha : half) Append(alpha, plane_, &planes);
+  }
+  law_ = device_.MakeFrom(planes);
+  planes.clear();
+  const auto fields = implicit::SheetFieldsAt(host_.context, host_.state, host_.state.linearisation.point, nullptr);
+  for (const auto* field : {&fields.start, &fields.velocity, &fields.load}) {
+    for (const float* plane : *field) Append(plane, plane_, &planes);
+  }
+  Append(fields.element_diagonal, plane_, &planes);
+  fields_ = device_.MakeFrom(planes);
+  triangles_ = device_.Make(sizeof(float) * kTrianglePlanes * plane_);
+  linearised_ = device_.Make(sizeof(float) * kLinearisedPlanes * plane_);
+}
+
+void DeviceSolve::Linearise() {
+  const implicit::Inertia& inertia = host_.inertia;
+  device_.Launch("SheetTriangles", plane_, matrix_, law_, triangles_, host_.model.sheet.triangle_stiffening,
+                 implicit::kLeastSheetDeterminant);
+  device_.Launch("SheetLinearise", plane_, matrix_, triangles_, fields_, linearised_, inertia.inertia, 1.0f / inertia.h,
+                 inertia.gravity[0], inertia.gravity[1], inertia.gravity[2]);
+}
+
+std::vector<float> DeviceSolve::ReadLinearisation() {
+  std::vector<float> planes((kLinearisedPlanes + kCouplingPlanes) * plane_);
+  device_.Read(linearised_, 0, planes.data(), kLinearisedPlanes * plane_);
+  device_.Read(triangles_, (kTrianglePlanes - kCouplingPlanes) * plane_, planes.data() + kLinearisedPlanes * plane_,
+               kCouplingPlanes * plane_);
+  return planes;
 }
 
 void DeviceSolve::SetDirection(const FloatArray& z) { device_.Write(z_, 0, z.data(), field_); }

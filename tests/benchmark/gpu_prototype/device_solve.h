@@ -1,6 +1,6 @@
-// The linear solve of a substep on the device: products, curvature, vector operations and the membrane's part of the
-// preconditioner there; hats, coarse nodes, the organ's preconditioner and the coefficients of conjugate gradients on
-// the host.
+// The linear solve of a substep on the device, and the linearisation of the membrane: products, curvature, vector
+// operations and the membrane's part of the preconditioner there; hats, coarse nodes, the organ's preconditioner and
+// the coefficients of conjugate gradients on the host.
 #pragma once
 
 #include <vector>
@@ -33,6 +33,12 @@ class DeviceSolve {
   Dots ReadDots();
   void ReadProduct(FloatArray* q);
 
+  /// The membrane's linearisation at the host's linearisation point, in two launches: matrix, residual without bindings
+  /// and hinges, diagonal blocks.
+  void Linearise();
+  /// Planes kt[3], along[3], residual[3], inverse blocks[6], coupling[2][3] of the last Linearise.
+  [[nodiscard]] std::vector<float> ReadLinearisation();
+
   /// Two iterations from the host's residual; `d` <- the correction. The steps of LinearSolver::Solve(2).
   void Solve(FloatArray* d);
   /// The launches of a Solve without its transfers and without the host's part: the sequence that a backend with
@@ -40,6 +46,7 @@ class DeviceSolve {
   void Queue();
 
  private:
+  void CopyLaw(const implicit::Sheet& sheet);
   void Restrict();
   void Precondition();
   /// Sums of `dots` by task. `parity` as in the kernel LaneSums.
@@ -63,6 +70,7 @@ class DeviceSolve {
   Buffer matrix_, levels_, hat_weights_, hat_cell_, hat_fraction_, hat_value_, row_sums_;
   Buffer organ_c_, organ_f_, organ_mass_, start_, vertex_, gradient_, patch_start_, patch_, patch_gradient_;
   Buffer sheet_bounds_of_tasks_, organ_bounds_of_tasks_;
+  Buffer law_, fields_, triangles_, linearised_;
   Buffer r_, z_, p_, q_, d_, pulls_, lines_, sheet_dots_, organ_dots_, lanes_, sheet_partial_, organ_partial_;
 };
 

@@ -57,7 +57,8 @@ struct Difference {
   double largest = 0;  ///< Over `scale`.
   bool equal_bits = true;
 };
-Difference Compare(const FloatArray& host, const FloatArray& device, std::size_t first, std::size_t end) {
+template <class Floats>
+Difference Compare(const Floats& host, const Floats& device, std::size_t first, std::size_t end) {
   Difference difference;
   for (std::size_t i = first; i < end; ++i) {
     difference.scale = std::max(difference.scale, std::abs(static_cast<double>(host[i])));
@@ -129,6 +130,28 @@ void CompareProduct(const std::string& stem, const HostProduct& expected, Produc
   report->Add(stem + "sheet_equal_bits", sheet.equal_bits && dots.sheet == expected.sheet_dot ? 1 : 0, "1");
   report->Add(stem + "organ_largest_difference", organ.largest, "1");
   report->Add(stem + "organ_equal_bits", organ.equal_bits && dots.organ == expected.organ_dot ? 1 : 0, "1");
+}
+
+/// Matrix, residual and blocks of the membrane.
+void CompareLinearisation(const std::string& stem, HostCase* host, Device* device, DeviceSolve* solve, Report* report) {
+  const int samples = report->quick() ? 5 : 41;
+  host->ResetResidual();
+  host->LineariseSheet();
+  solve->Linearise();
+  const std::vector<float> expected = host->Linearisation(), planes = solve->ReadLinearisation();
+  // By quantity, since their units differ.
+  Difference difference;
+  for (std::size_t first = 0, plane = host->model.layout.plane; first < planes.size(); first += 3 * plane) {
+    const Difference of = Compare(expected, planes, first, first + 3 * plane);
+    difference.largest = std::max(difference.largest, of.largest);
+    difference.equal_bits = difference.equal_bits && of.equal_bits;
+  }
+  const auto time = [&](const auto& body) { return LeastProcessorUs(samples, 4, body, [&] { device->Finish(); }); };
+  const double host_us = time([&] { host->LineariseSheet(); });
+  report->Add(stem + "largest_difference", difference.largest, "1");
+  report->Add(stem + "equal_bits", difference.equal_bits ? 1 : 0, "1");
+  report->Add(stem + "host_cpu_us", host_us, "us");
+  report->Add(stem + "over_host", time([&] { solve->Linearise(); }) / host_us, "1");
 }
 
 void TimeProduct(const std::string& stem, HostCase* host, Device* device, DeviceSolve* solve, Report* report) {
@@ -249,10 +272,12 @@ void MeasureCase(const std::string& name, const SceneView& scene, Device* device
     CompareProduct(stem + "product.", product, Product::kTwoLaunches, host, &solve, report);
     CompareProduct(stem + "product_in_one.", product, Product::kOneLaunch, host, &solve, report);
     if (whole) CompareSolve(stem + "solve.", &host, device, &solve, report);
+    CompareLinearisation(stem + "linearise.", &host, device, &solve, report);
     TimeProduct(stem, &host, device, &solve, report);
     TimeSolve(stem + "solve.", &host, device, &solve, report);
   }
   DeviceSolve fused(device, &host, Rounding::kFused);
+  CompareLinearisation(stem + "fused.linearise.", &host, device, &fused, report);
   CompareProduct(stem + "fused.product.", product, Product::kTwoLaunches, host, &fused, report);
   if (whole) CompareSolve(stem + "fused.solve.", &host, device, &fused, report);
 }

@@ -108,6 +108,31 @@ double HostCase::ApplyOrgan(const FloatArray& p) {
   return sum;
 }
 
+void HostCase::LineariseSheet() {
+  const implicit::LinearSystem system = System();
+  const implicit::SheetFields fields =
+      implicit::SheetFieldsAt(context, state, state.linearisation.point, &state.linearisation.residual);
+  for (const Task& task : state.regions.computed().tasks) {
+    if (!task.sheet) continue;
+    context.kernels.sheet.linearise(system.sheet, inertia, fields, system.sheet_matrix, scratch.carry[0].data(), false,
+                                    task.first, task.end);
+  }
+}
+
+std::vector<float> HostCase::Linearisation() {
+  const implicit::LinearSystem system = System();
+  std::vector<float> planes;
+  const auto append = [&](const float* plane) { planes.insert(planes.end(), plane, plane + model.layout.plane); };
+  for (const float* kt : system.sheet_matrix.kt) append(kt);
+  for (const float* along : system.sheet_matrix.along) append(along);
+  for (const float* residual : model.layout.Planes(std::as_const(state.linearisation.residual))) append(residual);
+  for (const float* block : system.sheet_matrix.block) append(block);
+  for (const auto& half : system.sheet_matrix.coupling) {
+    for (const float* coupling : half) append(coupling);
+  }
+  return planes;
+}
+
 void HostCase::ResetResidual() {
   std::copy_n(residual_.data(), residual_.size(), state.linearisation.residual.data());
   state.linearisation.lacks_element_forces = true;

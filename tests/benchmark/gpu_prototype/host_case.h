@@ -26,6 +26,9 @@ class HostCase {
   /// the solver's order.
   double ApplySheet(const FloatArray& p);
   double ApplyOrgan(const FloatArray& p);
+  /// The membrane's linearisation again, and its planes as DeviceSolve::ReadLinearisation has them.
+  void LineariseSheet();
+  [[nodiscard]] std::vector<float> Linearisation();
   /// The residual of the linearisation again: a solve changes it.
   void ResetResidual();
   /// The solver's own two iterations; Krylov d <- the correction.

@@ -1,13 +1,13 @@
-// The kernels of a substep's linear solve in OpenCL C, operation by operation those of physics_node/implicit
-// (sheet_rows_impl.h, level_kernels_impl.h, organ_patches_impl.h, organ_kernels_impl.h), where equations, symbols and
-// layouts are explained. A work item computes one node of the membrane, one patch or one vertex of the organ, in the
-// layout of the host's fields. Effects that the host's kernels hand on from slot to slot and from row to row are
-// computed again from the neighbours' cells, in the order in which the host adds them. Nothing is contracted, so a
-// device whose division is correctly rounded gives the host's bits.
+// The kernels of a substep's linear solve, and of the membrane's linearisation, in OpenCL C, operation by operation
+// those of physics_node/implicit (sheet_rows_impl.h, level_kernels_impl.h, organ_patches_impl.h,
+// organ_kernels_impl.h), where equations, symbols and layouts are explained. A work item computes one node of the
+// membrane, one patch or one vertex of the organ, in the layout of the host's fields. Effects that the host's kernels
+// hand on from slot to slot and from row to row are computed again from the neighbours' cells, in the order in which
+// the host adds them. Nothing is contracted, so a device whose division is correctly rounded gives the host's bits.
 //
 // Options: ROWS, SLOTS of the membrane; TUBE floats of the organ in a field; HAT_SLOTS; CONTRACTED: products and sums
-// may be fused, as GPU compilers do by default. Planes of `matrix`: kt[3], along[3], coupling[2][3], x*[3], mass of nodes
-// that move; of `levels`: inverse blocks[6]. A field is the organ's xyz_, then three planes.
+// may be fused, as GPU compilers do by default. Planes of `matrix`: kt[3], along[3], coupling[2][3], x*[3], mass of
+// nodes that move; of `levels`: inverse blocks[6]. A field is the organ's xyz_, then three planes.
 #ifdef CONTRACTED
 #pragma OPENCL FP_CONTRACT ON
 #else
@@ -325,4 +325,124 @@ __kernel void Precondition(In matrix, In levels, In hat_weights, In value, __glo
   float3 result = own + from_hats;
   Put(result, z_field + TUBE, i);
   dots[i] = Dot3(b, result);
+}
+
+// Linearisation of the membrane as a continuum without springs, in two launches. First each cell's triangles
+// (sheet_triangles_impl.h): planes tension[2][3], along[2][3], coupling[2][3] from `law`, planes a[2], alpha[2][3].
+enum { T_ALONG = 6, T_COUPLING = 12 };
+__kernel void SheetTriangles(In matrix, In law, Out t, float stiffening, float least_determinant) {
+  const int pairs[3][2] = {{0, 1}, {0, 2}, {1, 2}};
+  int i = (int)get_global_id(0);
+  Edges d = EdgesAt(matrix + POINT * PLANE, i);
+  for (int half_of = 0; half_of < 2; ++half_of) {
+    float3 edge[3] = {d.of[0], d.of[2] - d.of[0], d.of[2]};
+    if (half_of == 1) {
+      edge[0] = d.of[2] - d.of[1];
+      edge[1] = d.of[1];
+    }
+    float a = law[half_of * PLANE + i], alpha[3], l[3], slope[3], first[3];
+    for (int k = 0; k < 3; ++k) {
+      alpha[k] = law[(2 + 3 * half_of + k) * PLANE + i];
+      l[k] = Dot3(edge[k], edge[k]);
+    }
+    float half_g = 0.5f * (alpha[0] * alpha[1] + alpha[1] * alpha[2] + alpha[2] * alpha[0]);
+    float sum = l[0] + l[1] + l[2], twice = 0.0f, trace = 0.0f;
+    for (int k = 0; k < 3; ++k) {
+      slope[k] = half_g * (sum - 2.0f * l[k]);
+      twice = twice + slope[k] * l[k];
+      trace = trace + alpha[k] * l[k];
+    }
+    float determinant = 0.5f * twice, at = determinant > least_determinant ? determinant : least_determinant;
+    bool crushed = determinant < least_determinant;
+    float inverse = 1.0f / at, f1 = 0.0f - inverse * inverse;
+    float invariant = trace + inverse + f1 * (determinant - at) - 3.0f;
+    float weight = 1.0f + (2.0f * stiffening) * invariant;
+    for (int k = 0; k < 3; ++k) first[k] = alpha[k] + f1 * slope[k];
+    float f2 = crushed ? 0.0f : 2.0f * inverse * inverse * inverse, bent = f1 * half_g;
+    float curve = crushed ? 0.0f : bent, curve_own = crushed ? 0.0f - 2.0f * bent : 0.0f - bent;
+    float four = 4.0f * a, bend = 2.0f * stiffening;
+    for (int k = 0; k < 3; ++k) {
+      int m = pairs[k][0], n = pairs[k][1], to = 3 * half_of + k;
+      t[to * PLANE + i] = 2.0f * a * weight * first[k];
+      t[(T_ALONG + to) * PLANE + i] =
+          four * (weight * (f2 * (slope[k] * slope[k]) + curve_own) + bend * (first[k] * first[k]));
+      t[(T_COUPLING + to) * PLANE + i] =
+          four * (weight * (f2 * (slope[m] * slope[n]) + curve) + bend * (first[m] * first[n]));
+    }
+  }
+}
+
+// What an edge does to its first node: force, and xx yy zz xy xz yz of its stiffness.
+typedef struct {
+  float v[9], kt, along;
+} Terms;
+Terms ActingOnEnds(float3 d, float tension, float along) {
+  Terms e;
+  e.along = 0.0f + along;
+  tension = 0.0f + tension;
+  e.kt = tension > 0.0f ? tension : 0.0f;
+  float3 f = d * tension, a = d * e.along;
+  e.v[0] = f.x;
+  e.v[1] = f.y;
+  e.v[2] = f.z;
+  e.v[3] = e.kt + a.x * d.x;
+  e.v[4] = e.kt + a.y * d.y;
+  e.v[5] = e.kt + a.z * d.z;
+  e.v[6] = a.x * d.y;
+  e.v[7] = a.x * d.z;
+  e.v[8] = a.y * d.z;
+  return e;
+}
+// The edges that the node at i owns. Triangles: 0 R, B', D; 1 R', B, D (edges 0, 1, 2 of each).
+Terms RightEdge(In point, In t, int i) {
+  int above = i - STRIDE;
+  float tension = i >= STRIDE ? t[3 * PLANE + above] : 0.0f;
+  float along = i >= STRIDE ? t[(T_ALONG + 3) * PLANE + above] : 0.0f;
+  return ActingOnEnds(At(point, RightOf(i)) - At(point, i), t[i] + tension, t[T_ALONG * PLANE + i] + along);
+}
+Terms DownEdge(In point, In t, int i) {
+  int left = LeftOf(i);
+  return ActingOnEnds(At(point, i + Below(i)) - At(point, i), t[4 * PLANE + i] + t[PLANE + left],
+                      t[(T_ALONG + 4) * PLANE + i] + t[(T_ALONG + 1) * PLANE + left]);
+}
+Terms DiagonalEdge(In point, In t, int i) {
+  return ActingOnEnds(At(point, RightOf(i) + Below(i)) - At(point, i), t[2 * PLANE + i] + t[5 * PLANE + i],
+                      t[(T_ALONG + 2) * PLANE + i] + t[(T_ALONG + 5) * PLANE + i]);
+}
+// Then edges, residual and diagonal blocks of each node. `fields`: planes x_n[3], v_n[3], load[3], k_e; `out`: planes
+// kt[3], along[3], residual[3], inverse blocks[6].
+__kernel void SheetLinearise(In matrix, In t, In fields, Out out, float inertia, float inverse_h, float gx, float gy,
+                             float gz) {
+  int i = (int)get_global_id(0), left = LeftOf(i);
+  In point = matrix + POINT * PLANE;
+  Terms right = RightEdge(point, t, i), down = DownEdge(point, t, i), across = DiagonalEdge(point, t, i);
+  Terms from_left = RightEdge(point, t, left), from_above, from_across;
+  bool first_row = i < STRIDE;
+  if (!first_row) {
+    from_above = DownEdge(point, t, i - STRIDE);
+    from_across = DiagonalEdge(point, t, left - STRIDE);
+  }
+  float sum[9];
+  for (int c = 0; c < 9; ++c) {
+    float incoming = first_row ? 0.0f : from_above.v[c] + from_across.v[c];
+    sum[c] = (c < 3 ? down.v[c] - incoming : down.v[c] + incoming) + across.v[c];
+    sum[c] = (c < 3 ? sum[c] - from_left.v[c] : sum[c] + from_left.v[c]) + right.v[c];
+  }
+  out[i] = right.kt;
+  out[PLANE + i] = down.kt;
+  out[2 * PLANE + i] = across.kt;
+  out[3 * PLANE + i] = right.along;
+  out[4 * PLANE + i] = down.along;
+  out[5 * PLANE + i] = across.along;
+  float mass = matrix[MASS * PLANE + i];
+  float3 momentum = (At(point, i) - At(fields, i)) * inertia - At(fields + 3 * PLANE, i) * inverse_h;
+  float3 elastic = (float3)(sum[0], sum[1], sum[2]);
+  Put(elastic + At(fields + 6 * PLANE, i) + ((float3)(gx, gy, gz) - momentum) * mass, out + 6 * PLANE, i);
+  float own = fields[9 * PLANE + i] + mass * inertia;
+  float xx = sum[3] + own, yy = sum[4] + own, zz = sum[5] + own, xy = sum[6], xz = sum[7], yz = sum[8];
+  float c00 = yy * zz - yz * yz, c01 = xz * yz - xy * zz, c02 = xy * yz - xz * yy;
+  float c11 = xx * zz - xz * xz, c12 = xy * xz - xx * yz, c22 = xx * yy - xy * xy;
+  float scale = mass > 0.0f ? 1.0f / (xx * c00 + xy * c01 + xz * c02) : 0.0f;
+  float inverse[6] = {c00, c11, c22, c01, c02, c12};
+  for (int k = 0; k < 6; ++k) out[(9 + k) * PLANE + i] = mass > 0.0f ? inverse[k] * scale : 0.0f;
 }
