@@ -63,9 +63,10 @@ std::vector<config::KeyRule> AllRules() {
   // Defaults of a sheet that names no material come before those of one that does.
   constexpr const char* kSheet =
       "name: sheet\nbodies: [{name: b, material: fat, shape: {ellipsoid_mm: [20, 20, 20]}}]\n"
-      "sheets: [{name: s, over: b, at_mm: [0, 0, 20], facing: [0, 0, 1], width_mm: 20, length_mm: 20}]\n"
-      "regions: [{name: r, box_mm: [9, 9, 9]}, {name: e, ellipsoid_mm: [9, 9, 9]}]\n";
-  add(scene::ParseSceneYaml(kSheet, "sheet.yaml", {}).rules);
+      "sheets: [{name: s, over: b, at_mm: [0, 0, 20], facing: [0, 0, 1], width_mm: 20, length_mm: 20}]\n";
+  for (const std::string region : {"box_mm", "ellipsoid_mm"}) {
+    add(scene::ParseSceneYaml(kSheet + ("regions: [{name: r, " + region + ": [9, 9, 9]}]\n"), "sheet.yaml", {}).rules);
+  }
   add(scene::SceneRules(runtime::ShareFolder() / "scenes" / "adhesions.yaml"));
   // What a material says is no default of the key, a sheet lies over a body or between two lines, and a region is a box
   // or an ellipsoid.
