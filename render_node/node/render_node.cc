@@ -82,16 +82,15 @@ void RenderNode::Step(const Tick& tick) {
     FindLate();
   }
   UpdateHands();
-  if (!ready()) {
-    return;
-  }
+  if (!ready()) return;
   if (view_.HasFaded(session_time_s_)) changed_on_screen_ = changed_in_file_ = true;
   // A new reader receives a picture even if nothing moves.
   const bool streamed = std::exchange(streams_, outlet_.has_readers());
   if (streams_ && !streamed) changed_on_screen_ = true;
   const bool write = outlet_.has_folder() && (screenshot_ || (changed_in_file_ && session_time_s_ >= next_png_s_));
   screenshot_ = false;
-  if (write || ((window_ || streams_) && changed_on_screen_)) {
+  const bool live = (window_ || streams_) && (changed_on_screen_ || view_.Refine());
+  if (write || live) {
     Draw(session_time_s_, write);
   } else if (view_.TubesWork()) {
     FollowEffects();
@@ -115,6 +114,7 @@ bool RenderNode::DrawInto(Bitmap* picture) {
 
 void RenderNode::DrawFrom(const RenderParams& camera, Bitmap* picture) {
   (void)view_.UpdateEffects(session_time_s_);
+  view_.SetSmoothed(false);  // A data set depends on no earlier picture.
   view_.SetCamera(camera);
   view_.SetScale(quality_.scale());
   view_.SetTexts({});
@@ -136,9 +136,7 @@ void RenderNode::WaitForFiles() {
 }
 
 void RenderNode::TakeTissue() {
-  if (!ports_.tissue.TakeLatest(&new_tissue_)) {
-    return;
-  }
+  if (!ports_.tissue.TakeLatest(&new_tissue_)) return;
   arrivals_[0].time_s = session_time_s_;
   arrivals_[0].silence_s = new_tissue_.header.next_within_s;
   if (new_tissue_.header.scene_hash != scene_.hash || new_tissue_.xyz.size() < 3 * scene_.rest_position.size()) {
@@ -264,9 +262,7 @@ void RenderNode::TakeGenerator() {
 }
 
 void RenderNode::TakeContact() {
-  if (!ports_.contacts.TakeLatest(&contact_)) {
-    return;
-  }
+  if (!ports_.contacts.TakeLatest(&contact_)) return;
   // Events report the first steam at a place only; steam continues while power is delivered to boiling tissue.
   const Heat& heat = heat_[contact_.on_solid ? 1 : 0];
   const bool boils = hud_.power_W > 0 && heat.highest_C > kBoils_C && Recent(heat.time_s);
@@ -371,6 +367,9 @@ void RenderNode::Draw(double session_time_s, bool write_png, ReadBack read) {
   const auto start = std::chrono::steady_clock::now();
   const bool moving = view_.UpdateEffects(session_time_s);
   view_.SetScale(quality_.scale());
+  // A single file has no pictures shortly before it; a GPU draws many samples a pixel.
+  view_.SetSmoothed((window_ || streams_ || read == ReadBack::kAlways) && !display_.is_gpu() &&
+                    shape_.width * shape_.height <= LaparoscopeView::kMostSmoothed);
   view_.Update();
   UpdateTexts();
   const PictureOutlet::Use use{write_png, streams_, session_time_s, streams_ ? HeaderNow() : PictureHeader()};

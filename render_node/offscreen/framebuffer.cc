@@ -41,6 +41,17 @@ void CopyTexture(unsigned from, unsigned to, int width, int height) {
   glCopyImageSubData(from, GL_TEXTURE_2D, 0, 0, 0, 0, to, GL_TEXTURE_2D, 0, 0, 0, 0, width, height, 1);
 }
 
+void ReadTexture(unsigned texture, int width, int height, std::uint32_t* rgba) {
+  glPixelStorei(GL_PACK_ALIGNMENT, 4);
+  glGetTextureSubImage(texture, 0, 0, 0, 0, width, height, 1, GL_RGBA, GL_UNSIGNED_BYTE, 4 * width * height, rgba);
+}
+
+void WriteTexture(unsigned texture, int width, int height, const std::uint32_t* rgba) {
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
+  glTextureSubImage2D(texture, 0, 0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
+}
+
 void ReadBoundFramebuffer(int x, int y, int width, int height, Bitmap* picture) {
   picture->width = width;
   picture->height = height;

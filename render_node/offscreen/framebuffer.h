@@ -42,6 +42,11 @@ class Framebuffer {
 /// (OpenGL 4.3).
 void CopyTexture(unsigned from, unsigned to, int width, int height);
 
+/// Reads and writes the first width x height texels of a two-dimensional texture, by GL name (OpenGL 4.5): four bytes
+/// each, red first in memory, rows from the bottom up.
+void ReadTexture(unsigned texture, int width, int height, std::uint32_t* rgba);
+void WriteTexture(unsigned texture, int width, int height, const std::uint32_t* rgba);
+
 /// Reads a part of the window or framebuffer that is bound for reading; (x, y) is its lower left corner.
 void ReadBoundFramebuffer(int x, int y, int width, int height, Bitmap* picture);
 

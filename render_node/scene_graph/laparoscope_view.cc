@@ -314,6 +314,10 @@ void LaparoscopeView::SetScale(float scale) { impl_->optics.SetScale(scale); }
 
 void LaparoscopeView::SetMostScale(float most) { impl_->optics.SetMostScale(most); }
 
+void LaparoscopeView::SetSmoothed(bool on) { impl_->optics.SetSmoothed(on); }
+
+bool LaparoscopeView::Refine() { return impl_->optics.Refine(); }
+
 void LaparoscopeView::Update() {
   impl_->ShowFat();
   if (impl_->layers.Update()) {

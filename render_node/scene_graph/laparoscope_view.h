@@ -68,6 +68,13 @@ class LaparoscopeView {
   /// Largest scale, 1 at first; above it the scene's pixels are averaged.
   void SetMostScale(float most);
 
+  /// Smooths edges where nothing moves, by means of the last pictures (geometry/temporal_filter.h). For a software
+  /// rasteriser, scales up to 1, and pictures of at most kMostSmoothed pixels: more would take a third of the time.
+  static constexpr int kMostSmoothed = 1280 * 720;
+  void SetSmoothed(bool on);
+  /// Makes the next picture smoother while nothing changes; false if it would be the same as the last one.
+  bool Refine();
+
   /// Updates the meshes after SetTissue and SetTopology; separate, so that several changes need one update only.
   /// Without a change the next picture reuses the last one of the scene.
   void Update();

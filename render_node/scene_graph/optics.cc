@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "render_node/offscreen/framebuffer.h"
@@ -32,15 +34,34 @@ void LookFrom(const Laparoscope& eye, osg::Camera* camera) {
   camera->setProjectionMatrix(ToOsg(eye.projection));
 }
 
-/// Disables its camera after a picture, until something has changed.
+/// Disables its camera after a picture, until something has changed, and adds the picture to the mean of the last ones.
 class DrawnOnce : public osg::Camera::DrawCallback {
  public:
-  explicit DrawnOnce(osg::Camera* camera) : camera_(camera) {}
-  void operator()(osg::RenderInfo&) const override { camera_->setNodeMask(0); }
+  explicit DrawnOnce(osg::Camera* camera, std::shared_ptr<SmoothedScene> smoothed = nullptr)
+      : camera_(camera), smoothed_(std::move(smoothed)) {}
+  void operator()(osg::RenderInfo& info) const override {
+    camera_->setNodeMask(0);
+    if (smoothed_) smoothed_->Add(kPictureUnit, info.getState());
+  }
 
  private:
   osg::Camera* camera_;  // Owns this.
+  std::shared_ptr<SmoothedScene> smoothed_;
 };
+
+osg::ref_ptr<osg::Texture2D> MakeRenderTexture(GLint internal, GLenum format, GLenum type) {
+  osg::ref_ptr<osg::Texture2D> texture = new osg::Texture2D;
+  texture->setInternalFormat(internal);
+  texture->setSourceFormat(format);
+  texture->setSourceType(type);
+  texture->setFilter(osg::Texture::MIN_FILTER, osg::Texture::LINEAR);
+  texture->setFilter(osg::Texture::MAG_FILTER, osg::Texture::LINEAR);
+  texture->setWrap(osg::Texture::WRAP_S, osg::Texture::CLAMP_TO_EDGE);
+  texture->setWrap(osg::Texture::WRAP_T, osg::Texture::CLAMP_TO_EDGE);
+  texture->setResizeNonPowerOfTwoHint(false);
+  return texture;
+}
+osg::ref_ptr<osg::Texture2D> MakeColour() { return MakeRenderTexture(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE); }
 
 }  // namespace
 
@@ -76,6 +97,7 @@ Optics::Optics(StereoLayout layout, std::span<const Laparoscope> eyes, int width
                osg::Node* scene)
     : layout_(layout),
       node_(new osg::Group),
+      background_(background),
       radius_(new osg::Uniform("circle_radius", osg::Vec2())),
       centre_(new osg::Uniform("picture_centre", osg::Vec2())),
       half_(new osg::Uniform("half_height", osg::Vec2())),
@@ -90,29 +112,36 @@ Optics::Optics(StereoLayout layout, std::span<const Laparoscope> eyes, int width
       soiled_lens_(MakeProgram("field.vert", "soiled.frag")) {
   osg::StateSet* state = node_->getOrCreateStateSet();
   for (osg::Uniform* uniform : {radius_.get(), centre_.get(), half_.get()}) state->addUniform(uniform);
-  for (std::size_t k = 0; k < eyes.size(); ++k) AddEye(background, scene);
+  for (std::size_t k = 0; k < eyes.size(); ++k) AddEye(scene);
   SetLight(Vec3f::Ones());
   SetEyes(eyes);
   SetSize(eyes, width, height);
 }
 
-void Optics::AddEye(osg::Node* background, osg::Node* scene) {
+void Optics::AddEye(osg::Node* scene) {
   Eye eye;
-  const int order = 2 * static_cast<int>(eyes_.size());
+  eye.order = 2 * static_cast<int>(eyes_.size());
   eye.light_position = new osg::Uniform("light_position", osg::Vec3());
-  for (Background& each : eye.backgrounds) each.target = MakeTarget(order, background);
-  eye.scene = MakeTarget(order + 1, scene);
+  eye.scene = MakeTarget(eye.order + 1, scene);
   eye.scene.camera->setClearMask(0);
   eye.scene.camera->getOrCreateStateSet()->addUniform(eye.light_position);
-  for (Background& each : eye.backgrounds) {
-    each.target.camera->setClearColor(osg::Vec4(0.12f, 0.035f, 0.03f, 1));
-    each.target.camera->getOrCreateStateSet()->addUniform(eye.light_position);
-    each.copy = new osg::Geode;
-    each.copy->addDrawable(new CopyTarget(each.target, eye.scene));
-    eye.scene.camera->addChild(each.copy);
-  }
+  KeepBackgrounds(2, &eye);
   eye.field = AddField(eye.scene.colour);
   eyes_.push_back(eye);
+}
+
+void Optics::KeepBackgrounds(std::size_t count, Eye* eye) {
+  while (eye->backgrounds.size() < count) {
+    Background& each = eye->backgrounds.emplace_back();
+    each.target = MakeTarget(eye->order, background_);
+    each.target.camera->setNodeMask(0);
+    each.target.camera->setClearColor(osg::Vec4(0.12f, 0.035f, 0.03f, 1));
+    each.target.camera->getOrCreateStateSet()->addUniform(eye->light_position);
+    each.copy = new osg::Geode;
+    each.copy->setNodeMask(0);
+    each.copy->addDrawable(new CopyTarget(each.target, eye->scene));
+    eye->scene.camera->addChild(each.copy);
+  }
 }
 
 void Optics::SetSize(std::span<const Laparoscope> eyes, int width, int height) {
@@ -123,11 +152,7 @@ void Optics::SetSize(std::span<const Laparoscope> eyes, int width, int height) {
   circle_radius_ = eyes.front().circle_radius * squeeze;
   picture_centre_ = eyes.front().picture_centre.cwiseProduct(squeeze);
   half_height_ = eyes.front().picture_centre.y() * squeeze;
-  for (std::size_t k = 0; k < eyes_.size(); ++k) {
-    Background& background = eyes_[k].backgrounds[eyes_[k].used];
-    for (const Target& target : {background.target, eyes_[k].scene}) LookFrom(eyes[k], target.camera);
-    background.from = eyes[k];
-  }
+  for (std::size_t k = 0; k < eyes_.size(); ++k) eyes_[k].seen = eyes[k];
   ResizeTextures();
 }
 
@@ -137,7 +162,30 @@ void Optics::SetMostScale(float most) {
   ResizeTextures();
 }
 
-int Optics::Texels(int pixels) const { return static_cast<int>(std::lround(most_ * static_cast<float>(pixels))); }
+void Optics::SetSmoothed(bool on) {
+  if (on == smoothed()) return;
+  for (Eye& eye : eyes_) {
+    eye.smoothed = nullptr;
+    eye.mean = nullptr;
+    if (on) {
+      eye.mean = MakeColour();
+      eye.smoothed = std::make_shared<SmoothedScene>(eye.scene.colour, eye.mean);
+    }
+    eye.scene.camera->setFinalDrawCallback(new DrawnOnce(eye.scene.camera, eye.smoothed));
+  }
+  ResizeTextures();
+}
+
+int Optics::Pixels(int full) const {
+  return std::clamp(static_cast<int>(std::lround(scale_ * static_cast<float>(full))), 1, Texels(full, most_));
+}
+
+// Backgrounds of many places within a pixel must not take more memory than they need.
+int Optics::Texels(int full) const { return Texels(full, smoothed() ? std::min(scale_, most_) : most_); }
+
+int Optics::Texels(int full, float scale) {
+  return std::max(1, static_cast<int>(std::lround(scale * static_cast<float>(full))));
+}
 
 void Optics::ResizeTextures() {
   const auto resize = [this](const Target& target) {
@@ -148,7 +196,15 @@ void Optics::ResizeTextures() {
     // Without this OpenSceneGraph keeps the framebuffer of the previous textures.
     target.camera->dirtyAttachmentMap();
   };
-  for (const Eye& eye : eyes_) {
+  for (Eye& eye : eyes_) {
+    eye.kept = 2;
+    if (eye.smoothed) {
+      eye.smoothed->SetSize(width_, height_, Pixels(width_), Pixels(height_));
+      eye.mean->setTextureSize(width_, height_);
+      eye.mean->dirtyTextureObject();
+      eye.kept = static_cast<std::size_t>(eye.smoothed->period());
+      KeepBackgrounds(eye.kept, &eye);
+    }
     for (const Background& each : eye.backgrounds) resize(each.target);
     resize(eye.scene);
   }
@@ -156,21 +212,9 @@ void Optics::ResizeTextures() {
 }
 
 Optics::Target Optics::MakeTarget(int order, osg::Node* content) {
-  const auto make_texture = [](GLint internal, GLenum format, GLenum type) {
-    osg::ref_ptr<osg::Texture2D> texture = new osg::Texture2D;
-    texture->setInternalFormat(internal);
-    texture->setSourceFormat(format);
-    texture->setSourceType(type);
-    texture->setFilter(osg::Texture::MIN_FILTER, osg::Texture::LINEAR);
-    texture->setFilter(osg::Texture::MAG_FILTER, osg::Texture::LINEAR);
-    texture->setWrap(osg::Texture::WRAP_S, osg::Texture::CLAMP_TO_EDGE);
-    texture->setWrap(osg::Texture::WRAP_T, osg::Texture::CLAMP_TO_EDGE);
-    texture->setResizeNonPowerOfTwoHint(false);
-    return texture;
-  };
   Target target;
-  target.colour = make_texture(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE);
-  target.depth = make_texture(GL_DEPTH_COMPONENT24, GL_DEPTH_COMPONENT, GL_UNSIGNED_INT);
+  target.colour = MakeColour();
+  target.depth = MakeRenderTexture(GL_DEPTH_COMPONENT24, GL_DEPTH_COMPONENT, GL_UNSIGNED_INT);
   target.camera = new osg::Camera;
   target.camera->setReferenceFrame(osg::Transform::ABSOLUTE_RF);
   target.camera->setRenderOrder(osg::Camera::PRE_RENDER, order);
@@ -227,14 +271,15 @@ osg::ref_ptr<osg::StateSet> Optics::AddField(osg::Texture2D* scene) {
 void Optics::SetScale(float scale) {
   if (scale == scale_) return;
   scale_ = scale;
-  UseScale();
+  if (smoothed()) {
+    ResizeTextures();
+  } else {
+    UseScale();
+  }
 }
 
 void Optics::UseScale() {
-  const auto pixels = [this](int full) {
-    return std::clamp(static_cast<int>(std::lround(scale_ * static_cast<float>(full))), 1, Texels(full));
-  };
-  const int width = pixels(width_), height = pixels(height_);
+  const int width = Pixels(width_), height = Pixels(height_);
   for (const Eye& eye : eyes_) {
     for (const Background& each : eye.backgrounds) each.target.camera->setViewport(0, 0, width, height);
     eye.scene.camera->setViewport(0, 0, width, height);
@@ -244,8 +289,12 @@ void Optics::UseScale() {
   radius_->set(osg::Vec2(circle_radius_.x(), circle_radius_.y()) * share.y());
   centre_->set(osg::Vec2(picture_centre_.x() * share.x(), picture_centre_.y() * share.y()));
   half_->set(osg::Vec2(half_height_.x(), half_height_.y()) * share.y());
-  const osg::Vec2 texel(1.0f / static_cast<float>(Texels(width_)), 1.0f / static_cast<float>(Texels(height_)));
-  const osg::Vec2 used(static_cast<float>(width) * texel.x(), static_cast<float>(height) * texel.y());
+  // The field's texture is the mean of the scene's pictures, or one of them.
+  const std::array size = smoothed() ? std::array{width_, height_} : std::array{Texels(width_), Texels(height_)};
+  const osg::Vec2 texel(1.0f / static_cast<float>(size[0]), 1.0f / static_cast<float>(size[1]));
+  const osg::Vec2 used = smoothed()
+                             ? osg::Vec2(1, 1)
+                             : osg::Vec2(static_cast<float>(width) * texel.x(), static_cast<float>(height) * texel.y());
   texture_scale_->set(used);
   // Texels beyond this hold an older picture of another resolution.
   texture_most_->set(used - texel * 0.5f);
@@ -259,31 +308,34 @@ void Optics::SetEyes(std::span<const Laparoscope> eyes) {
     Eye& eye = eyes_[k];
     const Laparoscope& seen = eyes[k];
     eye.light_position->set(osg::Vec3(seen.light_position.x(), seen.light_position.y(), seen.light_position.z()));
-    LookFrom(seen, eye.scene.camera);
-    const auto is_of = [&](const Background& each) {
-      return each.from && each.from->view == seen.view && each.from->projection == seen.projection &&
-             each.from->light_power == seen.light_power;
-    };
-    if (is_of(eye.backgrounds[eye.used])) continue;
-    eye.Use(1 - eye.used);
-    Background& next = eye.backgrounds[eye.used];
-    if (is_of(next)) continue;
-    LookFrom(seen, next.target.camera);
-    next.target.camera->setNodeMask(~0u);
-    next.from = seen;
+    eye.seen = seen;
   }
   SceneChanged();
 }
 
-void Optics::Eye::Use(std::size_t background) {
+void Optics::Eye::Look() {
+  const Laparoscope from = smoothed ? smoothed->Jittered(seen) : seen;
+  field->setTextureAttribute(kPictureUnit, smoothed && !smoothed->moves() ? mean : scene.colour);
+  LookFrom(from, scene.camera);
+  const auto is_of = [&](const Background& each) {
+    return each.from && each.from->view == from.view && each.from->projection == from.projection &&
+           each.from->light_power == from.light_power;
+  };
   Background& before = backgrounds[used];
+  if (is_of(before)) return;
   if (before.target.camera->getNodeMask() != 0) {
     before.from.reset();  // It has not been drawn.
     before.target.camera->setNodeMask(0);
   }
   before.copy->setNodeMask(0);
-  backgrounds[background].copy->setNodeMask(~0u);
-  used = background;
+  const auto found = std::ranges::find_if(backgrounds, is_of);
+  used = found != backgrounds.end() ? static_cast<std::size_t>(found - backgrounds.begin()) : (used + 1) % kept;
+  Background& next = backgrounds[used];
+  next.copy->setNodeMask(~0u);
+  if (is_of(next)) return;
+  LookFrom(from, next.target.camera);
+  next.target.camera->setNodeMask(~0u);
+  next.from = from;
 }
 
 void Optics::SetSoil(float soil) {
@@ -309,15 +361,29 @@ void Optics::UseLens() {
 }
 
 void Optics::SceneChanged() {
-  for (const Eye& eye : eyes_) eye.scene.camera->setNodeMask(~0u);
+  for (Eye& eye : eyes_) {
+    if (eye.smoothed) eye.smoothed->Changed();
+    eye.Draw();
+  }
+}
+
+bool Optics::Refine() {
+  if (!smoothed() || !eyes_.front().smoothed->improves()) return false;
+  for (Eye& eye : eyes_) eye.Draw();
+  return true;
+}
+
+void Optics::Eye::Draw() {
+  scene.camera->setNodeMask(~0u);
+  Look();
 }
 
 void Optics::BackgroundsChanged() {
   for (Eye& eye : eyes_) {
-    Background &now = eye.backgrounds[eye.used], &other = eye.backgrounds[1 - eye.used];
-    now.target.camera->setNodeMask(~0u);
-    other.target.camera->setNodeMask(0);
-    other.from.reset();
+    for (Background& each : eye.backgrounds) {
+      each.target.camera->setNodeMask(0);
+      each.from.reset();
+    }
   }
   SceneChanged();
 }

@@ -5,7 +5,7 @@
 // same.
 #pragma once
 
-#include <array>
+#include <memory>
 #include <optional>
 #include <osg/Camera>
 #include <osg/Geode>
@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "render_node/geometry/laparoscope.h"
+#include "render_node/scene_graph/smoothed_scene.h"
 
 namespace fulcrum::render {
 
@@ -30,6 +31,11 @@ class Optics {
   void SetScale(float scale);
   /// Largest scale, 1 at first: the textures have as many pixels.
   void SetMostScale(float most);
+  /// Smooths edges with the last pictures of the scene (smoothed_scene.h); for a software rasteriser, scales up to 1.
+  void SetSmoothed(bool on);
+  /// Draws the scene again, at other places within its pixels, while that still makes the mean of its pictures better.
+  /// Returns false, and does nothing, if it would not, or if it is not smoothed.
+  bool Refine();
   /// Moves the cameras; the size of the picture does not change. The backgrounds of the last two places are kept, for
   /// pictures of two cameras in turn.
   void SetEyes(std::span<const Laparoscope> eyes);
@@ -55,29 +61,43 @@ class Optics {
   };
   /// What an eye sees, and its part of the picture.
   struct Eye {
-    void Use(std::size_t background);
+    /// Draws the scene in the next picture.
+    void Draw();
+    /// Looks from `seen`, or a place within a pixel of it. Draws its background, unless that is among those kept.
+    void Look();
 
-    std::array<Background, 2> backgrounds;
+    Laparoscope seen;
+    std::vector<Background> backgrounds;
     std::size_t used = 0;  // Of them.
+    std::size_t kept = 2;  // So many of them hold pictures.
+    int order = 0;         // Of drawing.
     Target scene;
+    std::shared_ptr<SmoothedScene> smoothed;  // Null: not.
+    osg::ref_ptr<osg::Texture2D> mean;        // Of smoothed.
     osg::ref_ptr<osg::Uniform> light_position;
     osg::ref_ptr<osg::StateSet> field;
   };
   class CopyTarget;
   Target MakeTarget(int order, osg::Node* content);
-  void AddEye(osg::Node* background, osg::Node* scene);
+  void AddEye(osg::Node* scene);
+  [[nodiscard]] bool smoothed() const { return !eyes_.empty() && eyes_.front().smoothed != nullptr; }
+  void KeepBackgrounds(std::size_t count, Eye* eye);
   void BackgroundsChanged();
   [[nodiscard]] osg::ref_ptr<osg::StateSet> AddField(osg::Texture2D* scene);
   void UseScale();
   void UseLens();
   void ResizeTextures();
-  [[nodiscard]] int Texels(int pixels) const;
+  /// Of the scene, and of its textures, across or up, where the picture has `full`.
+  [[nodiscard]] int Pixels(int full) const;
+  [[nodiscard]] int Texels(int full) const;
+  [[nodiscard]] static int Texels(int full, float scale);
 
   StereoLayout layout_;
   int width_ = 1, height_ = 1;                          // Of an eye's part of the picture [pixels].
   Vec2f circle_radius_, picture_centre_, half_height_;  // In such pixels across and up.
   float scale_ = 1, most_ = 1;
   osg::ref_ptr<osg::Group> node_;
+  osg::ref_ptr<osg::Node> background_;
   osg::ref_ptr<osg::Uniform> radius_, centre_, half_, texture_scale_, texture_most_, pixel_, soil_, haze_, smoke_;
   osg::ref_ptr<osg::Program> clear_lens_, smooth_lens_, soiled_lens_;
   std::vector<Eye> eyes_;

@@ -49,6 +49,29 @@ SceneView Enlarged(SceneView view, int size) {
 
 }  // namespace
 
+Bitmap Mean(const Bitmap& fine, int n) {
+  Bitmap mean{fine.width / n, fine.height / n, {}};
+  for (int y = 0; y < mean.height; ++y) {
+    for (int x = 0; x < mean.width; ++x) {
+      for (int channel = 0; channel < 3; ++channel) {
+        int sum = 0;
+        for (int k = 0; k < n * n; ++k)
+          sum += fine.rgb[3 * TexelIndex(n * x + k % n, n * y + k / n, fine.width) + channel];
+        mean.rgb.push_back(static_cast<std::uint8_t>((sum + n * n / 2) / (n * n)));
+      }
+    }
+  }
+  return mean;
+}
+
+double MeanDifference(const Bitmap& a, const Bitmap& b, const std::vector<std::size_t>& pixels) {
+  double sum = 0;
+  for (const std::size_t pixel : pixels) {
+    for (std::size_t k = 3 * pixel; k < 3 * pixel + 3; ++k) sum += std::abs(int{a.rgb[k]} - int{b.rgb[k]});
+  }
+  return sum / (3.0 * static_cast<double>(pixels.size()));
+}
+
 SampledView::SampledView(const SceneView& scene, const SyntheticMoment& moment, int size, float scale)
     : view(Enlarged(scene, size)), laparoscope(view) {
   laparoscope.SetMostScale(std::max(1.0f, scale));
@@ -98,6 +121,8 @@ void FullScene(const SceneView& scene, StereoLayout layout, std::uint32_t width,
   Show(moment, &laparoscope);
   QualityControl quality(Quality::kAuto, static_cast<int>(view.render.height), display->is_gpu());
   laparoscope.SetMostScale(quality.most());
+  // As the node does for a window and live pictures.
+  laparoscope.SetSmoothed(!display->is_gpu() && static_cast<int>(width * height) <= LaparoscopeView::kMostSmoothed);
   std::vector<float> xyz;
   std::vector<double> frame_ms, cpu_side_ms;
   const int repeats = report->quick() ? 20 : 100, settling = 200;
@@ -183,22 +208,6 @@ void ReadBack(const SceneView& scene, benchmark::Report* report) {
   });
 }
 
-/// Mean over blocks of n x n pixels.
-Bitmap Mean(const Bitmap& fine, int n) {
-  Bitmap mean{fine.width / n, fine.height / n, {}};
-  for (int y = 0; y < mean.height; ++y) {
-    for (int x = 0; x < mean.width; ++x) {
-      for (int channel = 0; channel < 3; ++channel) {
-        int sum = 0;
-        for (int k = 0; k < n * n; ++k)
-          sum += fine.rgb[3 * TexelIndex(n * x + k % n, n * y + k / n, fine.width) + channel];
-        mean.rgb.push_back(static_cast<std::uint8_t>(sum / (n * n)));
-      }
-    }
-  }
-  return mean;
-}
-
 /// Mean difference [of 255] from a picture of four by four samples a pixel, over its edge pixels.
 void Edges(const SceneView& scene, benchmark::Report* report) {
   if (!report->Wants("render.edge_error")) return;
@@ -214,14 +223,7 @@ void Edges(const SceneView& scene, benchmark::Report* report) {
   const Bitmap reference = Mean(draw(kSamples, 1), kSamples);
   const std::vector<std::size_t> edges = EdgePixels(reference);
   for (const auto& [name, scale] : kSampledScales) {
-    const Bitmap picture = draw(1, scale);
-    double sum = 0;
-    for (const std::size_t edge : edges) {
-      for (std::size_t channel = 0; channel < 3; ++channel) {
-        sum += std::abs(int{picture.rgb[3 * edge + channel]} - int{reference.rgb[3 * edge + channel]});
-      }
-    }
-    report->Add(std::string("render.edge_error.") + name, sum / (3.0 * static_cast<double>(edges.size())), "1/255");
+    report->Add(std::string("render.edge_error.") + name, MeanDifference(draw(1, scale), reference, edges), "1/255");
   }
 }
 
@@ -382,6 +384,7 @@ int main(int argc, char** argv) {
     render::ReadBack(view, &report);
     render::Edges(view, &report);
     render::Flicker(view, &report);
+    render::Smoothing(view, &report);
     render::LookFigures(view, &report);
     render::Uploads(view, &report);
     render::Embedding(view, &report);

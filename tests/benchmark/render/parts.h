@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "render_node/scene_graph/display.h"
 #include "render_node/scene_graph/laparoscope_view.h"
@@ -22,6 +23,11 @@ struct SampledView {
   std::unique_ptr<Display> display;
 };
 
+/// Mean over blocks of n x n pixels.
+[[nodiscard]] Bitmap Mean(const Bitmap& fine, int n);
+/// Mean difference of the channels of some pixels [of 255].
+[[nodiscard]] double MeanDifference(const Bitmap& a, const Bitmap& b, const std::vector<std::size_t>& pixels);
+
 /// The qualities whose pictures are compared with many samples a pixel, by scale.
 constexpr std::pair<const char*, float> kSampledScales[] = {
     {"low", 0.52f}, {"high", 1.0f}, {"smooth2", 2.0f}, {"smooth4", 4.0f}};
@@ -32,5 +38,8 @@ void LookFigures(const SceneView& built_in, benchmark::Report* report);
 
 /// render.temporal_flicker.*: edges while the scope creeps.
 void Flicker(const SceneView& scene, benchmark::Report* report);
+
+/// render.smoothing.*: edges that rest, edges while the hook moves, and what remains of a moved hook.
+void Smoothing(const SceneView& scene, benchmark::Report* report);
 
 }  // namespace fulcrum::render

@@ -127,7 +127,8 @@ TEST_F(RenderNodeTest, ShowsTheForceOfTheTissueAndNotThatOnTheHand) {
   SyntheticMoment moment = MakeSyntheticMoment(view_, 1.0);
   Publish(moment);
   node->Step(At(1.0));
-  node->Step(At(1.02));  // Smoke and blood of the first moment have come to rest.
+  // Smoke and blood of the first moment have come to rest, and the picture is as smooth as it will be.
+  for (int k = 0; k < 20; ++k) node->Step(At(1.02 + 0.001 * k));
   const double drawn = Metric(*node, "frames_drawn");
   ASSERT_GE(drawn, 1);
   moment.tools.tools[0].f_W = Vec3f(0, 0, 1);
@@ -176,6 +177,7 @@ TEST_F(RenderNodeTest, SendsEachChangeWhilePicturesAreReadAndNoneOtherwise) {
   node->Step(At(1.0));
   EXPECT_EQ(Metric(*node, "pictures_sent"), 0);
   Picture picture;
+  std::uint64_t drawn = 0;
   {
     const auto reader = bus_.pictures.MakeInput();
     const auto received = [&] {
@@ -195,12 +197,16 @@ TEST_F(RenderNodeTest, SendsEachChangeWhilePicturesAreReadAndNoneOtherwise) {
     EXPECT_EQ(received(), 2u);
     EXPECT_EQ(picture.header.tip_W[1], moment.tools.tools[1].p_WT);
     EXPECT_EQ(picture.header.session_time_s, 1.2);
-    node->Step(At(1.25));
-    EXPECT_EQ(Metric(*node, "pictures_sent"), 2) << "nothing has changed";
+    // What rests becomes smoother for some pictures, unless a GPU draws many samples a pixel at once.
+    for (int k = 0; k < 20; ++k) node->Step(At(1.2 + 0.001 * k));
+    drawn = node->pictures_drawn();
+    EXPECT_LE(drawn, 20u);
+    for (int k = 0; k < 20; ++k) node->Step(At(1.25 + 0.001 * k));
+    EXPECT_EQ(node->pictures_drawn(), drawn) << "nothing has changed";
   }
   Publish(MakeSyntheticMoment(view_, 1.3));
   node->Step(At(1.3));
-  EXPECT_EQ(Metric(*node, "pictures_sent"), 2) << "the topic has no reader";
+  EXPECT_EQ(node->pictures_drawn(), drawn) << "the topic has no reader";
 }
 
 TEST_F(RenderNodeTest, ThePictureIsThatOfTheHeldScope) {
