@@ -2,6 +2,8 @@
 // 20 x 20 x 10 mm and loose, a millimetre above its middle. No organ, no sheet.
 #pragma once
 
+#include <cmath>
+
 #include "tests/support/several_solids.h"
 
 namespace fulcrum {
