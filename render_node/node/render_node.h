@@ -59,7 +59,8 @@ class RenderNode {
   ~RenderNode();
 
   /// Reads the ports and draws if the picture will be used: in a window, or while the topic Picture has a reader, after
-  /// each change; otherwise if a PNG is due and something has changed since the last one. Else nothing is computed.
+  /// each change, and on a software rasteriser after the last one until edges are smooth (LaparoscopeView::Refine);
+  /// otherwise if a PNG is due and something has changed since the last one. Else nothing is computed.
   void Step(const Tick& tick);
 
   /// Moves smoke and blood on to the time of the last Step, for steps that draw nothing: otherwise they make up at most
@@ -70,7 +71,8 @@ class RenderNode {
   /// since the last picture or no tissue has come yet. Call from the thread of Step, after it.
   [[nodiscard]] bool DrawInto(Bitmap* picture);
 
-  /// Draws the present state as another camera sees it, without text. Call from the thread of Step, after it.
+  /// Draws the present state as another camera sees it, without text, smoothing and earlier pictures. Call from the
+  /// thread of Step, after it.
   void DrawFrom(const RenderParams& camera, Bitmap* picture);
 
   /// What the next picture shows.
