@@ -69,7 +69,7 @@ class LaparoscopeView {
   void SetMostScale(float most);
 
   /// Smooths edges where nothing moves, by means of the last pictures (geometry/temporal_filter.h). For a software
-  /// rasteriser, scales up to 1, and pictures of at most kMostSmoothed pixels: more would take a third of the time.
+  /// rasteriser, scales up to 1, and pictures of at most kMostSmoothed pixels: its time and memory grow with them.
   static constexpr int kMostSmoothed = 1280 * 720;
   void SetSmoothed(bool on);
   /// Makes the next picture smoother while nothing changes; false if it would be the same as the last one.
