@@ -5,7 +5,7 @@
 //             where s n . o < -kSideCosine |o|, behind:  depth = r + m + |o|,                direction -s n
 //             else                                       depth = r + m - |o|,                direction -o / |o|
 //
-//   r, m      radius of the capsule and ContactMargin [m]
+//   r, m      radius of the capsule and ContactMargin of the sheet [m]
 //   y, o      closest point of the triangle; closest point of the axis minus y [m]
 //   n, s      normal of the membrane around the triangle, or of the organ's triangle; side of the tool, +1 or -1
 //   x         the two ends of the axis [m]
@@ -14,6 +14,8 @@
 
 #include <algorithm>
 #include <cmath>
+
+#include "services/base/core/sheet_heat.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -62,13 +64,23 @@ ToolCollision::ToolCollision(const TissueScene& scene, const TissueModel* model,
       particles_(particles),
       kernels_(kernels),
       membrane_triangles_(scene.membrane.triangle_count()),
+      thickness_(ThicknessOfRows(scene)),
+      thickest_m_(scene.thermal.thickness_m),
       bounds_(scene, model, particles, kernels) {
   for (std::uint32_t col = 0; col < scene.membrane.cols; ++col) {
     column_.push_back(particles->NodeRef(0, col));
   }
+  const auto usual = [&](float thickness) { return thickness == scene.thermal.thickness_m; };
+  if (std::all_of(thickness_.begin(), thickness_.end(), usual)) thickness_.clear();
+  for (const float thickness : thickness_) thickest_m_ = std::max(thickest_m_, thickness);
   pairs_.reserve(kPairCapacity);
   last_pairs_.reserve(kPairCapacity);
   row_order_.reserve(kPairCapacity);
+}
+
+float ToolCollision::MarginAt(Index triangle, ToolPart part) const {
+  if (thickness_.empty() || triangle >= membrane_triangles_) return ContactMargin(scene_, part);
+  return ContactMargin(scene_, part, thickness_[triangle / 2 / (scene_.membrane.cols - 1)]);
 }
 
 Vec3f ToolCollision::PatchNormal(Index cell, bool previous) const {
@@ -317,7 +329,8 @@ void ToolCollision::FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bo
       const Capsule from = moved.from.capsules[static_cast<std::size_t>(i)];
       const Capsule to = moved.to.capsules[static_cast<std::size_t>(i)];
       motion_[c] = {from, to, std::max((to.a - from.a).norm(), (to.b - from.b).norm()), true, SegmentOf(from, to)};
-      const float range = to.radius + ContactMargin(scene_, to.part) + kSlack + band_ - kRowBand + motion_[c].travel;
+      const float range =
+          to.radius + ContactMargin(scene_, to.part, thickest_m_) + kSlack + band_ - kRowBand + motion_[c].travel;
       if (!bounds_.MayTouch(to.a, to.b, range)) {
         continue;
       }
@@ -375,7 +388,7 @@ bool ToolCollision::OnRim(const ContactPair& pair) const {
 
 ToolCollision::Push ToolCollision::PushOf(const ContactPair& pair, const Capsule& capsule) const {
   const ClosestPoints& closest = pair.closest;
-  const float reach = capsule.radius + ContactMargin(scene_, capsule.part);
+  const float reach = capsule.radius + MarginAt(pair.triangle, capsule.part);
   const auto side = static_cast<float>(pair.side);
   const Vec3f offset = closest.on_segment - closest.on_triangle;
   const float distance = std::sqrt(closest.distance_sq);

@@ -99,6 +99,8 @@ class ToolCollision {
   /// Nearest live surface to a capsule's surface, at most `range` away.
   [[nodiscard]] SurfacePoint Nearest(const Capsule& capsule, float range) const;
   [[nodiscard]] Index membrane_triangle_count() const { return membrane_triangles_; }
+  /// ContactMargin at a triangle, of a sheet by its own thickness [m]; kNoIndex: by that of `thermal`.
+  [[nodiscard]] float MarginAt(Index triangle, ToolPart part) const;
 
  private:
   struct Motion {
@@ -184,6 +186,8 @@ class ToolCollision {
   ParticleStore* particles_;
   const collision::Kernels& kernels_;
   Index membrane_triangles_;
+  std::vector<float> thickness_;  ///< Of the sheet, by row of the grid [m]; empty: everywhere that of `thermal`.
+  float thickest_m_;              ///< Of all sheets and `thermal`.
   SurfaceBounds bounds_;
   std::vector<ParticleRef> column_;  ///< Nodes of the first row.
   std::array<Motion, kMaxTools * kMaxCapsules> motion_;

@@ -47,7 +47,7 @@ void ToolCollision::Sweep() {
 void ToolCollision::ProjectPair(ContactPair* pair, const Capsule& capsule) {
   const std::array<Vec3f, 3> x{particles_->At(pair->at[0]), particles_->At(pair->at[1]), particles_->At(pair->at[2])};
   pair->touching = false;
-  if (IsFar(x, capsule, capsule.radius + ContactMargin(scene_, capsule.part) + ProbeRange(capsule))) {
+  if (IsFar(x, capsule, capsule.radius + MarginAt(pair->triangle, capsule.part) + ProbeRange(capsule))) {
     pair->closest.distance_sq = kFarSq;
     pair->closest.crosses = false;
     return;

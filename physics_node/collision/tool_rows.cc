@@ -86,7 +86,7 @@ float ToolCollision::MarginReduction(const ContactPair& pair, ToolPart part, con
   }
   const Vec3f a = particles_->At(pair.at[0]);
   const Vec3f normal = (particles_->At(pair.at[1]) - a).cross(particles_->At(pair.at[2]) - a).normalized();
-  return ContactMargin(scene_, part) * (1.0f - std::abs(normal.dot(direction)));
+  return MarginAt(pair.triangle, part) * (1.0f - std::abs(normal.dot(direction)));
 }
 
 /// Removes the rows that are marked by count 0.
@@ -142,7 +142,7 @@ void ToolCollision::DropShallow(std::size_t first, std::vector<ContactRow>* rows
 
 void ToolCollision::AddRows(Index first, Index last, float u0, float u1, std::vector<ContactRow>* rows) {
   const Motion& m = motion_[pairs_[first].capsule];
-  const float reach = m.to.radius + ContactMargin(scene_, m.to.part);
+  const float reach = m.to.radius + ContactMargin(scene_, m.to.part, thickest_m_);
   const float range = reach + (u1 < 1.0f ? band_ : std::max(band_, ProbeRange(m.to))) + 0.5f * m.travel * (u1 - u0);
   const bool moves = (u1 - u0) * m.travel > kSampledTravel * m.to.radius;
   const float least = moves ? std::max(kLeastAdvance * m.to.radius / m.travel, (u1 - u0) / kMaxSamples) : 1.0f;

@@ -43,11 +43,15 @@ struct ToolShape {
 /// Suction tube: the last tip_length and the shaft, whatever its handle does.
 [[nodiscard]] ToolShape ShapeOf(const ToolDescription& tool, const ToolPose& pose);
 
-/// Distance between the surface of a capsule and the middle of the sheet in contact [m]. For the bare metal of a hook
-/// it is half the thickness of the sheet, so that mechanical contact is electrical contact.
-[[nodiscard]] inline float ContactMargin(const TissueScene& scene, ToolPart part) {
+/// Distance between the surface of a capsule and the middle of a sheet of this thickness in contact [m]. For the bare
+/// metal of a hook it is half the thickness, so that mechanical contact is electrical contact.
+[[nodiscard]] inline float ContactMargin(const TissueScene& scene, ToolPart part, float thickness_m) {
   const float margin = scene.physics.collision_margin_m;
-  return part == ToolPart::kTip ? std::min(margin, 0.5f * scene.thermal.thickness_m) : margin;
+  return part == ToolPart::kTip ? std::min(margin, 0.5f * thickness_m) : margin;
+}
+/// The same of the thickness of `thermal`: of solids, and of sheets without one of their own.
+[[nodiscard]] inline float ContactMargin(const TissueScene& scene, ToolPart part) {
+  return ContactMargin(scene, part, scene.thermal.thickness_m);
 }
 
 /// Centre line of the jaws, from hinge to tip; of a hook: its foot.

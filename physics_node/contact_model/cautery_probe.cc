@@ -12,7 +12,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/base/core/sheets.h"
+#include "services/base/core/sheet_heat.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -42,7 +42,11 @@ constexpr float kNoSheetSq = 1.0f;
 }  // namespace
 
 CauteryProbe::CauteryProbe(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles)
-    : scene_(scene), model_(model), particles_(particles), walk_(scene, model, particles) {
+    : scene_(scene),
+      model_(model),
+      particles_(particles),
+      walk_(scene, model, particles),
+      thickness_(ThicknessOfRows(scene)) {
   for (const float length : scene.membrane_rest_length) {
     spacing_ = std::max(spacing_, length);
   }
@@ -175,10 +179,13 @@ void CauteryProbe::SignHeights() {
   }
 }
 
+float CauteryProbe::ThicknessAt(Index cell) const {
+  const Index row = cell / (scene_.membrane.cols - 1);
+  return row < thickness_.size() ? thickness_[row] : scene_.thermal.thickness_m;
+}
+
 bool CauteryProbe::FindCentre(float radius_m, float step_s, Vec2f* centre) {
-  // In contact the middle of the sheet is further from the axis by half its thickness.
-  const float touch = radius_m + 0.5f * scene_.thermal.thickness_m;
-  const float limit = touch + (was_touching_ ? kHoldGap : kStrikeGap);
+  const float gap = was_touching_ ? kHoldGap : kStrikeGap;
   float sum = 0, mean = 0;
   for (std::size_t i = 0; i + 1 < stations_.size(); ++i) {
     const Station &a = stations_[i], &b = stations_[i + 1];
@@ -186,6 +193,8 @@ bool CauteryProbe::FindCentre(float radius_m, float step_s, Vec2f* centre) {
     if (length > kMaxPiece) {
       continue;
     }
+    // In contact the middle of the sheet is further from the axis by half its thickness.
+    const float touch = radius_m + 0.5f * ThicknessAt(a.place.cell()), limit = touch + gap;
     for (int k = 0; k < kCentreSamples; ++k) {
       const float u = (static_cast<float>(k) + 0.5f) / kCentreSamples;
       const float nearer = limit - std::abs(a.height_m + u * (b.height_m - a.height_m));
@@ -215,7 +224,7 @@ void CauteryProbe::AddGaps(Index triangle, const MetalAxis& axis, float radius_m
   const SheetAccess held{scene_, *model_, *particles_};
   const SlitSheet sheet(held);
   const TriangleParts parts = sheet.Parts(t);
-  const float cushion = 0.5f * scene_.thermal.thickness_m + kContactSlack;
+  const float cushion = 0.5f * ThicknessAt(triangle / 2) + kContactSlack;
   SurfaceTriangle piece;
   for (std::size_t k = 0; k < 3; ++k) {
     piece.material[k] = scene_.membrane_material[t.nodes[k]];

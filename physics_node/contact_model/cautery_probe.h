@@ -57,6 +57,8 @@ class CauteryProbe {
   void SignHeights();
   /// Mean place of the metal within the gap that conducts, weighted by (limit - distance)^2 and by the
   /// length that it covers. False: there is none.
+  /// Of the sheet of a cell [m]; without one that of `thermal`.
+  [[nodiscard]] float ThicknessAt(Index cell) const;
   bool FindCentre(float radius_m, float step_s, Vec2f* centre);
   /// Gaps of the cells around `centre` from the metal.
   void FillFootprint(const ToolPose& pose, const ToolDescription& tool, const ToolCollision& collision,
@@ -71,6 +73,7 @@ class CauteryProbe {
   const TissueModel* model_;
   const ParticleStore* particles_;
   SheetWalk walk_;
+  std::vector<float> thickness_;  ///< Of the sheet, by row of the grid [m].
   std::vector<Station> stations_;
   GapBox gaps_;
   std::vector<Index> near_cells_;

@@ -320,11 +320,11 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   Contact contact = MakeContact(tool);
   const float push = std::max(0.0f, memory.normal.dot(memory.force));
   const float dent = -memory.normal.dot(memory.u);
-  contact.gap = touching ? 0.0f : std::max(0.0f, nearest.gap - ContactMargin(scene_, TipPart(scene_, tool)));
+  const float margin = collision.MarginAt(at_sheet ? nearest.triangle : kNoIndex, TipPart(scene_, tool));
+  contact.gap = touching ? 0.0f : std::max(0.0f, nearest.gap - margin);
   contact.p_s = pose.p_WT + (touching ? push / contact.k1 + dent : -contact.gap) * memory.normal;
   const PrincipalCurvatures surface =
-      RolledOver(curvature_.At(nearest, touching, memory.normal),
-                 scene_.tools[tool].tip_radius_m + ContactMargin(scene_, TipPart(scene_, tool)));
+      RolledOver(curvature_.At(nearest, touching, memory.normal), scene_.tools[tool].tip_radius_m + margin);
   contact.e1 = surface.e1;
   contact.kappa1 = surface.kappa1;
   contact.kappa2 = surface.kappa2;

@@ -229,6 +229,7 @@ class Still {
       return collision_.pairs()[row.source].capsule == kMaxCapsules && row.normal.dot(place) < row.offset;
     }));
   }
+  [[nodiscard]] float MarginAt(Index triangle) const { return collision_.MarginAt(triangle, ToolPart::kTip); }
   void SetOpenCells(const OpenCells& open) { collision_.SetOpenCells(open); }
   /// Severs the edges from `row` to the next row and moves all rows beyond by `gap_m` in y.
   void Open(Index row, float gap_m) {
@@ -273,6 +274,22 @@ TEST_F(OnSheet, MetalThroughTheSheetCoversItsSection) {
   const double cushion = static_cast<double>((0.5f * scene_.thermal.thickness_m + 5e-5f) / scene_.thermal.cell_m);
   EXPECT_NEAR(slanted.extent.x(), 2 * (2 * radius + std::sqrt(3) * cushion), 2.01);
   EXPECT_NEAR(slanted.extent.y(), 2 * radius, 1.01);
+}
+
+TEST_F(OnSheet, TheThicknessIsThatOfTheSheet) {
+  SheetPart thick{"thick", 0, kRows, kCols, 0};
+  thick.thickness_m = 2 * scene_.thermal.thickness_m;
+  SceneView scene = scene_;
+  scene.sheets = std::span(&thick, 1);
+  Still still(scene);
+  const Covered slanted = CoveredBy(still.Through(30).footprint);
+  const double radius = static_cast<double>(scene_.tools[1].tip_radius_m / scene_.thermal.cell_m);
+  const double cushion = static_cast<double>((0.5f * thick.thickness_m + 5e-5f) / scene_.thermal.cell_m);
+  EXPECT_NEAR(slanted.extent.x(), 2 * (2 * radius + std::sqrt(3) * cushion), 2.01);
+  EXPECT_GT(slanted.extent.x(), CoveredBy(Still(scene_).Through(30).footprint).extent.x() + 2);
+  EXPECT_FLOAT_EQ(still.MarginAt(0), std::min(0.5f * thick.thickness_m, scene_.physics.collision_margin_m));
+  EXPECT_FLOAT_EQ(still.MarginAt(kNoIndex), 0.5f * scene_.thermal.thickness_m);
+  EXPECT_FLOAT_EQ(Still(scene_).MarginAt(0), 0.5f * scene_.thermal.thickness_m);
 }
 
 TEST_F(OnSheet, AFootprintMovesOnEvenly) {
