@@ -34,8 +34,8 @@ float Bleeding::VesselAt(const Vec2f& material) const {
   return static_cast<float>(vessels_[4 * TexelIndex(wrapped(material.x()), wrapped(material.y()), texels_) + 3]) / 255;
 }
 
-void Bleeding::Cut(const Vec2f& material, const Atlas& atlas, double session_time_s) {
-  Vec2f best = material;
+std::optional<Vec2f> Bleeding::LivingVessel(const Vec2f& material, const Atlas& atlas) const {
+  std::optional<Vec2f> best;
   float strongest = kVessel;
   for (const float radius : kRimRadii) {
     for (int k = 0; k < kRim; ++k) {
@@ -48,14 +48,18 @@ void Bleeding::Cut(const Vec2f& material, const Atlas& atlas, double session_tim
       }
     }
   }
+  return best;
+}
+
+void Bleeding::Cut(const Vec2f& material, const Atlas& atlas, double session_time_s) {
+  const std::optional<Vec2f> best = LivingVessel(material, atlas);
+  if (!best || scene_.membrane_material.empty()) return;
   const bool known = std::any_of(sources_.begin(), sources_.end(), [&](const Source& source) {
-    return source.open && (source.material - best).norm() < kSameVessel_m;
+    return source.open && (source.material - *best).norm() < kSameVessel_m;
   });
-  if (strongest <= kVessel || known || scene_.membrane_material.empty()) {
-    return;
-  }
+  if (known) return;
   if (!moves() && fluid_.dry()) time_s_ = session_time_s;
-  sources_[next_source_] = {true, best, 0};
+  sources_[next_source_] = {true, *best, 0};
   next_source_ = (next_source_ + 1) % sources_.size();
 }
 
@@ -84,7 +88,13 @@ bool Bleeding::Update(double session_time_s, const MembraneMesh& membrane, std::
 }
 
 void Bleeding::Bleed(Source* source, const Atlas& atlas) {
-  const auto texel = atlas.At(source->material);
+  auto texel = atlas.At(source->material);
+  if (texel && (*texel)[3] < 128) {
+    if (const auto rim = LivingVessel(source->material, atlas)) {
+      source->material = *rim;
+      texel = atlas.At(*rim);
+    }
+  }
   if (!texel || (*texel)[3] < 128 || (*texel)[1] >= kSealed || source->steps >= kClots_s / SheetFluid::kStep_s) {
     source->open = false;
     return;

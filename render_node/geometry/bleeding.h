@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "render_node/geometry/atlas.h"
@@ -24,8 +25,9 @@ class Bleeding {
   /// Registers a cut at `material` [m]: a vessel that ends at its rim in living tissue begins to bleed.
   void Cut(const Vec2f& material, const Atlas& atlas, double session_time_s);
 
-  /// Follows the time with the tubes as they are now. Sources close that heat has sealed (damage above a half, or
-  /// tissue removed) or that have bled for 8 s. Returns whether the film of the atlas has changed.
+  /// Follows the time with the tubes as they are now. A source that is cut away goes
+  /// on at the new rim. Sources close that heat has sealed (damage above a half there) or that have bled for 8 s.
+  /// Returns whether the film of the atlas has changed.
   bool Update(double session_time_s, const MembraneMesh& membrane, std::span<const WorkingTube> tubes, Atlas* atlas);
 
   [[nodiscard]] int sources() const;
@@ -46,6 +48,8 @@ class Bleeding {
     int steps = 0;  // Steps since it opened.
   };
   [[nodiscard]] float VesselAt(const Vec2f& material) const;
+  /// The strongest vessel in living tissue beside a place; none if there is none.
+  [[nodiscard]] std::optional<Vec2f> LivingVessel(const Vec2f& material, const Atlas& atlas) const;
   void Bleed(Source* source, const Atlas& atlas);
 
   SceneView scene_;

@@ -133,6 +133,28 @@ TEST_F(BleedingTest, HeatSealsIt) {
   EXPECT_EQ(Stained(), stained) << "the stains remain";
 }
 
+TEST_F(BleedingTest, AVesselThatIsCutFurtherBleedsAtTheNewRim) {
+  Bleeding bleeding(view_, vessels_, 1, 16);
+  bleeding.Cut(place_, atlas_, 1.0);
+  bleeding.Update(1.5, membrane_, {}, &atlas_);
+  const auto patch_at = [](float metres, float texel_m) { return static_cast<std::uint32_t>(metres / texel_m); };
+  TemperaturePatch patch;
+  patch.texels.assign(4u * kPatchTexels * kPatchTexels, 0);
+  for (std::size_t k = 0; k < patch.texels.size(); k += 4) patch.texels[k + 3] = 255;
+  const std::uint32_t x = patch_at(place_.x(), atlas_.texel_m()), y = patch_at(place_.y(), atlas_.texel_m());
+  patch.header.origin_x = x - 100;
+  patch.header.origin_y = y - 100;
+  for (std::uint32_t v = 94; v <= 106; ++v) {  // Removed within 0.6 mm: all places of the first ring.
+    for (std::uint32_t u = 94; u <= 106; ++u) patch.texels[4 * (v * kPatchTexels + u) + 3] = 0;
+  }
+  ASSERT_FALSE(atlas_.Apply(patch).empty());
+  bleeding.Update(1.6, membrane_, {}, &atlas_);
+  EXPECT_EQ(bleeding.sources(), 1);
+  Heat(200);
+  bleeding.Update(1.7, membrane_, {}, &atlas_);
+  EXPECT_EQ(bleeding.sources(), 0);
+}
+
 TEST_F(BleedingTest, ASmallVesselClosesByItself) {
   Bleeding bleeding(view_, vessels_, 1, 16);
   bleeding.Cut(place_, atlas_, 1.0);
