@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "physics_node/collision/sheet_collision.h"
 #include "physics_node/collision/tissue_collision.h"
 #include "physics_node/implicit/kernels.h"
 #include "physics_node/simd/sse.h"
@@ -17,6 +18,8 @@ namespace {
 constexpr float kToolStiffness_N_per_m = 2000.0f, kTissueStiffness_N_per_m = 30.0f;
 /// Of a vertex of one solid with another solid: it stands for some 25 mm^2, a node of the membrane for one.
 constexpr float kSolidStiffness_N_per_m = 400.0f;
+/// Of a node of a sheet with a triangle of a sheet: thin tissue without fat between. Assumed.
+constexpr float kSheetStiffness_N_per_m = 200.0f;
 /// Least movement along a surface that the Coulomb force is divided by [m]: less within a substep counts as sticking.
 /// Some hundred times the rounding of a position.
 constexpr float kStickDistance_m = 1e-6f;
@@ -125,9 +128,13 @@ ContactState StateOf(float h, const ContactRow& row, const Vec3f& here, const fl
 
 float Elements::ContactStiffness(const ContactRow& row) {
   if (!IsTissue(row)) return kToolStiffness_N_per_m;
+  if (IsOfSheets(row)) return kSheetStiffness_N_per_m;
   return (row.source & TissueCollision::kSolidSource) != 0 ? kSolidStiffness_N_per_m : kTissueStiffness_N_per_m;
 }
 bool Elements::IsTissue(const ContactRow& row) { return (row.source & TissueCollision::kSource) != 0; }
+bool Elements::IsOfSheets(const ContactRow& row) {
+  return IsTissue(row) && (row.source & SheetCollision::kSheetSource) != 0;
+}
 
 Elements::Elements(const TissueScene& scene, const ElasticModel& model, const ParticleStore& particles,
                    const Partition& partition)

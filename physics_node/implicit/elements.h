@@ -117,6 +117,8 @@ class Elements {
   [[nodiscard]] static float ContactStiffness(const ContactRow& row);
   /// Of tissue with tissue, not with a tool.
   [[nodiscard]] static bool IsTissue(const ContactRow& row);
+  /// Of a sheet with itself or another.
+  [[nodiscard]] static bool IsOfSheets(const ContactRow& row);
 
  private:
   struct BindingRest {

@@ -66,8 +66,10 @@ void WakeTouched(const SolverContext& context, const BoundaryConditions& boundar
       const auto count = static_cast<std::size_t>(row.count);
       const int body = partition.BodyOf(partition.Of(row.at[0]));
       bool pressed = row.drift.squaredNorm() > 0.0f;  // By something that moves.
+      // Parts of a sheet that touch are joined by nothing but the contact.
+      const bool of_sheets = Elements::IsOfSheets(row);
       for (std::size_t k = 1; k < count && !pressed; ++k) {
-        pressed = partition.BodyOf(partition.Of(row.at[k])) != body &&
+        pressed = (of_sheets || partition.BodyOf(partition.Of(row.at[k])) != body) &&
                   std::any_of(row.at.begin(), row.at.begin() + static_cast<std::ptrdiff_t>(count),
                               [&](ParticleRef at) { return regions->moving(partition.Of(at)); });
       }

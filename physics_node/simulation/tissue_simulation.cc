@@ -38,6 +38,7 @@ TissueSimulation::TissueSimulation(const TissueScene& scene, int threads, Instru
               tissue::KernelsFor(set)),
       collision_(scene, &model_, &particles_, collision::KernelsFor(set)),
       tissue_collision_(scene, &model_, &particles_, collision::KernelsFor(set)),
+      sheet_collision_(scene, &model_, &particles_),
       grasps_{Grasp(scene), Grasp(scene), Grasp(scene), Grasp(scene)},
       contacts_(scene, &model_, &particles_),
       cautery_(scene, &model_, &particles_),
@@ -60,7 +61,7 @@ TissueSimulation::TissueSimulation(const TissueScene& scene, int threads, Instru
       contacts_.SetComplianceSolver(&implicit_compliance_);
     }
     held_places_.reserve(particles_.particle_count());
-    rows_.reserve(kMaxTools * ToolCollision::kMaxRows + TissueCollision::kMaxRows);
+    rows_.reserve(kMaxTools * ToolCollision::kMaxRows + TissueCollision::kMaxRows + SheetCollision::kMaxRows);
   }
 }
 
@@ -125,13 +126,15 @@ void TissueSimulation::FindAllContacts(float h) {
     return;
   }
   tissue_collision_.BeginPairs(moved_, step_begin_s(), simulated_time_s());
-  // The tasks are independent: one for the tools and one for each part of a surface.
+  // The tasks are independent: one for the tools, one for the sheets and one for each part of a surface.
   const int tasks = tissue_collision_.tasks();
-  implicit_->workers().Run(tasks + 1, 0, 1, [&](int task, int) {
+  implicit_->workers().Run(tasks + 2, 0, 2, [&](int task, int) {
     if (task < tasks) {
       tissue_collision_.FindPairsOf(task, moved_);
-    } else {
+    } else if (task == tasks) {
       FindContacts(true, largest_speed_ * h);
+    } else {
+      sheet_collision_.FindPairs(moved_);
     }
   });
 }
@@ -208,14 +211,17 @@ StepReport TissueSimulation::StepAccurate() {
     const float u0 = static_cast<float>(i) / substeps, u1 = static_cast<float>(i + 1) / substeps;
     PlaceHeld(u1);
     constexpr int kParts = TissueCollision::kParts;
-    implicit_->workers().Run(kParts + 1, 0, 1, [&](int part, int) {
+    implicit_->workers().Run(kParts + 2, 0, 2, [&](int part, int) {
       if (part < kParts) {
         tissue_collision_.FindRows(part, u0, u1);
-      } else {
+      } else if (part == kParts) {
         collision_.Rows(u0, u1, &rows_);
+      } else {
+        sheet_collision_.FindRows(u1 - u0);
       }
     });
     tissue_collision_.JoinRows(&rows_);
+    sheet_collision_.JoinRows(&rows_);
     end_contacts();
     const implicit::SubstepReport substep = implicit_->Substep(h, iterations, held_places_, rows_);
     collision_.TakeForces(rows_);
@@ -304,6 +310,7 @@ int TissueSimulation::ApplyTopology(const TopologyState& topology) {
   if (edits > 0) {
     if (implicit_) {
       implicit_->UpdateTopology(model_);
+      sheet_collision_.Follow();
     }
     for (Grasp& grasp : grasps_) {
       grasp.DropDead(model_, &particles_);
@@ -461,6 +468,7 @@ bool TissueSimulation::Restore(std::span<const float> xyz, std::span<const float
     grasps_[i].Restore(memory.grasp_state[i], memory.held[i], &particles_);
   }
   tears_.Restore(memory.torn_edges);
+  sheet_collision_.Restart();
   counters_.steps = counters_.periods = memory.periods;
   sleep_.asleep = false;
   sleep_.still_steps = 0;

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "physics_node/collision/sheet_collision.h"
 #include "physics_node/collision/tissue_collision.h"
 #include "physics_node/collision/tool_collision.h"
 #include "physics_node/contact_model/cautery_probe.h"
@@ -87,6 +88,9 @@ class TissueSimulation {
   [[nodiscard]] const ParticleStore& particles() const { return particles_; }
   [[nodiscard]] const TissueModel& model() const { return model_; }
   [[nodiscard]] const ToolCollision& collision() const { return collision_; }
+  [[nodiscard]] const SheetCollision& sheet_collision() const { return sheet_collision_; }
+  /// Without contact of sheets with each other and themselves, for comparisons; mode accurate.
+  void IgnoreSheetContact() { sheet_collision_.Enable(false); }
   /// Contacts of the last substep with their forces; none in mode paper. Asleep: those of tools near the tissue,
   /// without forces.
   [[nodiscard]] std::span<const ContactRow> rows() const { return rows_; }
@@ -188,6 +192,7 @@ class TissueSimulation {
   float largest_speed_ = 0;                      ///< Of the tissue in the last step; not in mode paper [m/s].
   ToolCollision collision_;
   TissueCollision tissue_collision_;
+  SheetCollision sheet_collision_;
   std::array<Grasp, kMaxTools> grasps_;
   ContactProbe contacts_;
   ImplicitCompliance implicit_compliance_{this};

@@ -6,7 +6,7 @@
 
 namespace fulcrum::physics {
 
-class AccurateUnderTest final : public StoreSolver {
+class AccurateUnderTest : public StoreSolver {
  public:
   explicit AccurateUnderTest(const SceneView& scene, int threads = 1)
       : StoreSolver(scene),
@@ -15,12 +15,14 @@ class AccurateUnderTest final : public StoreSolver {
 
   void Step() override {
     solver_.BeginStep();
+    FindPairs(solver_.moved());
     for (int s = 1; s <= effort_.substeps; ++s) {
       const float part = static_cast<float>(s) / static_cast<float>(effort_.substeps);
       for (std::size_t i = 0; i < held_.size(); ++i) {
         targets_[i].place = begin_[i] + part * (places_[i] - begin_[i]);
       }
-      solver_.Substep(scene_.physics.dt_s / static_cast<float>(effort_.substeps), effort_.iterations, targets_, {});
+      solver_.Substep(scene_.physics.dt_s / static_cast<float>(effort_.substeps), effort_.iterations, targets_,
+                      Contacts(1.0f / static_cast<float>(effort_.substeps)));
     }
     begin_ = places_;
   }
@@ -33,7 +35,10 @@ class AccurateUnderTest final : public StoreSolver {
   /// Fraction of the tissue that is awake after the last step.
   [[nodiscard]] float awake_part() const { return solver_.regions().awake_part(); }
 
- private:
+ protected:
+  /// Contacts of a step; `part`: length of a substep as part of it.
+  virtual void FindPairs(std::span<const float>) {}
+  virtual std::span<ContactRow> Contacts(float) { return {}; }
   void Stop() override { solver_.Stop(); }
   void HeldChanged() override {
     targets_.clear();
@@ -44,6 +49,7 @@ class AccurateUnderTest final : public StoreSolver {
   }
   void TopologyChanged() override { solver_.UpdateTopology(tissue_); }
 
+ private:
   implicit::Effort effort_;
   implicit::ImplicitSolver solver_;
   std::vector<implicit::HeldPlace> targets_;

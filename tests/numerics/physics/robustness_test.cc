@@ -11,7 +11,9 @@
 #include "tests/numerics/physics/accurate_under_test.h"
 #include "tests/numerics/physics/paper_solver.h"
 #include "tests/numerics/physics/reference/elastic_energy.h"
+#include "tests/numerics/physics/sheets_under_test.h"
 #include "tests/numerics/physics/xpbd_under_test.h"
+#include "tests/support/flat_sheets.h"
 #include "tests/support/several_solids.h"
 
 namespace fulcrum::physics {
@@ -28,10 +30,27 @@ constexpr double kFoldedPart = 0.10, kReturnedPart = 0.02;
 /// the work, because the work is a sum over frames.
 constexpr double kEnergyMargin = 1.02, kWorkMargin = 1.05, kEnergyRounding_J = 1e-7;
 
-/// The small scene, if `several` with further solids, joined as `kind` says, with the moduli of the standard case.
-scene::SceneData MakeScene(bool several = false, scene::AttachKind kind = scene::AttachKind::kGlued) {
-  scene::SceneData data =
-      several ? SeveralSolids(Vec3f::Zero(), true, true, kind) : scene::BuildProcedural(scene::Small());
+enum class Content { kOneOrgan, kSeveralSolids, kSlidingSolids, kSheets };
+
+/// The small scene and a sheet of 13 x 13 nodes with free sides across its membrane, 1 mm above it.
+scene::SceneData OneSheetOverAnother() {
+  scene::SceneSettings settings = scene::Small();
+  scene::Anatomy anatomy = scene::ProceduralAnatomy(settings);
+  Vec3d top = anatomy.sheets[0].nodes[0];
+  for (const Vec3d& node : anatomy.sheets[0].nodes) top = node.z() > top.z() ? node : top;
+  anatomy.sheets.push_back(
+      FlatSheet("over", 13, 13, top + Vec3d(-0.012, -0.012, 0.001), Vec3d(0, 0.002, 0), Vec3d(0.002, 0, 0)));
+  anatomy.sheets.back().sides_held = false;
+  return scene::AssembleScene(settings, anatomy);
+}
+
+/// The small scene, perhaps with further solids or sheets, with the moduli of the standard case.
+scene::SceneData MakeScene(Content content = Content::kOneOrgan) {
+  const auto solids = [](scene::AttachKind kind) { return SeveralSolids(Vec3f::Zero(), true, true, kind); };
+  scene::SceneData data = content == Content::kSeveralSolids   ? solids(scene::AttachKind::kGlued)
+                          : content == Content::kSlidingSolids ? solids(scene::AttachKind::kSliding)
+                          : content == Content::kSheets        ? OneSheetOverAnother()
+                                                               : scene::BuildProcedural(scene::Small());
   PhysicsParams& physics = data.fixed.physics;
   physics.damping_per_s = 20;
   physics.membrane_Et_N_per_m = 300;
@@ -307,17 +326,18 @@ constexpr Abuse kMatrix[] = {
 struct Mode {
   const char* name;
   SolverFactory make;
-  bool strict;           ///< It must also return to rest.
-  bool several = false;  ///< With further solids.
-  scene::AttachKind kind = scene::AttachKind::kGlued;
+  bool strict;  ///< It must also return to rest.
+  Content content = Content::kOneOrgan;
 };
 const Mode kModes[] = {
     {"paper", [](const SceneView& s) { return std::make_unique<PaperSolver>(s); }, false},
     {"xpbd", [](const SceneView& s) { return std::make_unique<XpbdUnderTest>(s); }, false},
     {"accurate", [](const SceneView& s) { return std::make_unique<AccurateUnderTest>(s); }, true},
-    {"several", [](const SceneView& s) { return std::make_unique<AccurateUnderTest>(s); }, true, true},
-    {"sliding", [](const SceneView& s) { return std::make_unique<AccurateUnderTest>(s); }, true, true,
-     scene::AttachKind::kSliding},
+    {"several", [](const SceneView& s) { return std::make_unique<AccurateUnderTest>(s); }, true,
+     Content::kSeveralSolids},
+    {"sliding", [](const SceneView& s) { return std::make_unique<AccurateUnderTest>(s); }, true,
+     Content::kSlidingSolids},
+    {"sheets", [](const SceneView& s) { return std::make_unique<SheetsUnderTest>(s); }, true, Content::kSheets},
 };
 
 const Mode& kAccurate = kModes[2];
@@ -327,13 +347,14 @@ class Robustness : public testing::TestWithParam<std::tuple<int, int>> {};
 TEST_P(Robustness, StaysFiniteAndComesBack) {
   const Mode& mode = kModes[std::get<0>(GetParam())];
   const Abuse& abuse = kMatrix[std::get<1>(GetParam())];
-  scene::SceneData data = MakeScene(mode.several, mode.kind);
+  scene::SceneData data = MakeScene(mode.content);
   abuse.scene(&data);
   const SceneView scene = data.View();
   Trial trial(scene, mode.make);
   const double given = abuse.act(&trial), work = trial.Work();
+  const bool slides = mode.content == Content::kSlidingSolids;
   // Nothing leads what slides back; mirrored, its last two tetrahedra are still inverted after twice the time.
-  const double times = mode.kind == scene::AttachKind::kSliding && abuse.act == Mirror ? 4 : mode.several ? 2 : 1;
+  const double times = slides && abuse.act == Mirror ? 4 : slides || mode.content == Content::kSeveralSolids ? 2 : 1;
   const double gained = trial.Return(given, mode.strict ? times * kReturnTime_s : kLookTime_s);
   ASSERT_TRUE(trial.finite());
   RecordProperty("left_mm", std::to_string(1e3 * trial.DistanceFromRest()));
