@@ -207,7 +207,7 @@ void SheetCollision::Refresh(const Foot& foot, Watch* watch) const {
 }
 
 void SheetCollision::FindPairs(std::span<const float> moved) {
-  if (!enabled_) return;
+  if (pairs_ == SheetPairs::kNone || (pairs_ == SheetPairs::kBetweenSheets && half_thickness_.size() < 2)) return;
   patches_.Move(moved);
   if (!patches_.moving() && !unsearched_) return;
   std::erase_if(watches_, [this](Watch& watch) { return !Update(&watch); });

@@ -24,6 +24,10 @@
 
 namespace fulcrum::physics {
 
+/// Which sheets are kept from passing through each other. A slack sheet that lies on itself wrinkles and does not come
+/// to rest (deploy/docs/measurements/physics, Contact of sheets), so sessions have kBetweenSheets.
+enum class SheetPairs : std::uint8_t { kNone, kBetweenSheets, kAll };
+
 class SheetCollision {
  public:
   /// Bit in ContactRow.source that marks the rows of this class, beside that of all tissue.
@@ -50,8 +54,8 @@ class SheetCollision {
   }
   /// After a change of positions by something else than steps: forgets all pairs.
   void Restart();
-  /// Off: nothing is searched and there are no rows. For comparisons, from the start.
-  void Enable(bool enable) { enabled_ = enable; }
+  /// From the start. Without pairs nothing is searched and there are no rows.
+  void Take(SheetPairs pairs) { pairs_ = pairs; }
 
   /// Nodes that have a triangle near them.
   [[nodiscard]] std::size_t pair_count() const { return watches_.size(); }
@@ -125,7 +129,7 @@ class SheetCollision {
   std::vector<ContactRow> rows_;
   Index cursor_ = 0;        ///< Patch with which the next search begins.
   bool unsearched_ = true;  ///< Pairs of patches wait for their first search.
-  bool enabled_ = true;
+  SheetPairs pairs_ = SheetPairs::kBetweenSheets;
 };
 
 }  // namespace fulcrum::physics

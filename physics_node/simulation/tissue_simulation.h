@@ -89,8 +89,8 @@ class TissueSimulation {
   [[nodiscard]] const TissueModel& model() const { return model_; }
   [[nodiscard]] const ToolCollision& collision() const { return collision_; }
   [[nodiscard]] const SheetCollision& sheet_collision() const { return sheet_collision_; }
-  /// Without contact of sheets with each other and themselves, for comparisons; mode accurate.
-  void IgnoreSheetContact() { sheet_collision_.Enable(false); }
+  /// Other contacts of sheets than those of a session, for comparisons; mode accurate.
+  void TakeSheetPairs(SheetPairs pairs) { sheet_collision_.Take(pairs); }
   /// Contacts of the last substep with their forces; none in mode paper. Asleep: those of tools near the tissue,
   /// without forces.
   [[nodiscard]] std::span<const ContactRow> rows() const { return rows_; }

@@ -54,7 +54,8 @@ Run Compare(const SceneView& scene, int steps, int passes, Drive drive) {
   run.without = run.with;
   for (int pass = 0; pass < passes; ++pass) {
     TissueSimulation with(scene), without(scene);
-    without.IgnoreSheetContact();
+    with.TakeSheetPairs(SheetPairs::kAll);
+    without.TakeSheetPairs(SheetPairs::kNone);
     for (int i = 0; i < steps; ++i) {
       for (TissueSimulation* each : {&with, &without}) {
         const auto tools = drive(scene, i, each);

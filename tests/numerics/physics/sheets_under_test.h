@@ -11,7 +11,9 @@ namespace fulcrum::physics {
 class SheetsUnderTest final : public AccurateUnderTest {
  public:
   explicit SheetsUnderTest(const SceneView& scene)
-      : AccurateUnderTest(scene), collision_(scene, &tissue_, &particles_) {}
+      : AccurateUnderTest(scene), collision_(scene, &tissue_, &particles_) {
+    collision_.Take(SheetPairs::kAll);
+  }
 
  private:
   void FindPairs(std::span<const float> moved) override { collision_.FindPairs(moved); }
