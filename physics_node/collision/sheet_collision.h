@@ -1,6 +1,7 @@
-// Contact of a sheet with another sheet and with itself, for mode accurate. A sheet has two sides and is thin: a pair
-// of a node and the triangle nearest to it keeps the side on which the node was found, so that nothing is pushed
-// through. Row of node x against the point y = sum_i b_i x_i of the triangle, with its unit normal m and side s = +-1:
+// Contact of a sheet with another sheet, and with itself if SheetPairs::kAll, for mode accurate. A sheet has two sides
+// and is thin: a pair of a node and the triangle nearest to it keeps the side on which the node was found, so that
+// nothing is pushed through. Row of node x against the point y = sum_i b_i x_i of the triangle, with its unit normal m
+// and side s = +-1:
 //
 //   n . (x - y) >= c      n = (x - y) / |x - y| in front (s m . (x - y) > 0), else s m
 //
@@ -55,7 +56,11 @@ class SheetCollision {
   /// After a change of positions by something else than steps: forgets all pairs.
   void Restart();
   /// From the start. Without pairs nothing is searched and there are no rows.
-  void Take(SheetPairs pairs) { pairs_ = pairs; }
+  void Take(SheetPairs pairs) {
+    pairs_ = pairs;
+    patches_.WithinSheets(pairs == SheetPairs::kAll);
+    Restart();
+  }
 
   /// Nodes that have a triangle near them.
   [[nodiscard]] std::size_t pair_count() const { return watches_.size(); }

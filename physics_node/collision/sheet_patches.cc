@@ -178,14 +178,15 @@ std::span<const SheetPatches::Tile> SheetPatches::Tiles(Index patch) {
   return of.tiles;
 }
 
-void SheetPatches::Keep(Index a, Index b, bool adjoins) {
+bool SheetPatches::Keep(Index a, Index b, bool adjoins) {
   std::vector<Pair>& pairs = patches_[std::min(a, b)].pairs;
   const Index other = std::max(a, b);
   const bool known = std::any_of(pairs.begin(), pairs.end(), [&](const Pair& pair) { return pair.other == other; });
-  if (!known && pair_count_ < kMostPairs) {
-    pairs.push_back({.other = other, .adjoins = adjoins});
-    ++pair_count_;
-  }
+  if (known) return true;
+  if (pair_count_ >= kMostPairs) return false;
+  pairs.push_back({.other = other, .adjoins = adjoins});
+  ++pair_count_;
+  return true;
 }
 
 void SheetPatches::Drop(Index a, Index b) {
@@ -219,6 +220,10 @@ void SheetPatches::Evaluate(Index patch) {
   for (const Index j : patches_[patch].adjoining) {
     if (j != kNoIndex) gap_[j] = kLargestFinite;
   }
+  if (!within_) {
+    const Sheet& sheet = sheets_[SheetOf(patches_[patch].area.row0)];
+    std::fill_n(gap_.begin() + sheet.first_patch, std::size_t{sheet.patch_rows} * sheet.patch_cols, kLargestFinite);
+  }
   for (Index j = 0; j < n; ++j) {
     if (gap_[j] < kCloseSlack) {
       if (age_[j] > 0.0f) {
@@ -228,8 +233,7 @@ void SheetPatches::Evaluate(Index patch) {
         gap_[j] = std::sqrt(own.DistanceSq(other)) - reach_;
       }
       if (gap_[j] < kCloseSlack) {
-        Keep(patch, j, false);
-        gap_[j] = kLargestFinite;
+        gap_[j] = Keep(patch, j, false) ? kLargestFinite : 0.0f;
       }
     }
   }
@@ -254,7 +258,7 @@ bool SheetPatches::StaysClose(Index a, const Pair& pair) {
     const float apart = std::max(std::max(low_[axis][a] - high_[axis][b], low_[axis][b] - high_[axis][a]), 0.0f);
     sum += apart * apart;
   }
-  // Twice the slack: a pair at the border neither comes nor goes in each step.
+  // Twice the slack: a pair at the border is not added and removed in turns.
   const float gap = std::sqrt(sum) - reach_;
   if (gap < 2 * kCloseSlack) return true;
   room_[a] = std::min(room_[a], 0.5f * gap);
@@ -264,6 +268,7 @@ bool SheetPatches::StaysClose(Index a, const Pair& pair) {
 
 /// Fits the cone of a patch: pairs with those that adjoin it.
 void SheetPatches::FindFolds(Index patch) {
+  if (!within_) return;
   Patch& of = patches_[patch];
   of.cone = FitCone(of.area);
   of.turned = 0.0f;
@@ -296,11 +301,13 @@ void SheetPatches::Restart() {
 }
 
 void SheetPatches::Follow(std::span<const Index> edited_edges) {
+  edited_.assign(patches_.size(), 0);
   const auto mark = [&](std::uint32_t row, std::uint32_t col) {
     const std::size_t sheet = sheet_of_row_[row];
     if (row >= sheets_[sheet].first_row + sheets_[sheet].rows || col >= sheets_[sheet].cols) return;
     for (const Index i : patches_[Of(row, col)].adjoining) {
       if (i == kNoIndex) continue;
+      edited_[i] = 1;
       for (Tile& tile : patches_[i].tiles) {
         const Area& area = tile.area;
         if (row >= area.row0 && row <= area.row1 && col >= area.col0 && col <= area.col1) {
@@ -320,6 +327,8 @@ void SheetPatches::Follow(std::span<const Index> edited_edges) {
   }
   for (Index i = 0; i < count(); ++i) {
     if (patches_[i].cut) FindFolds(i);
+    // A contact ends with its triangle: its node may touch what is left.
+    for (Pair& pair : patches_[i].pairs) pair.fresh = pair.fresh || edited_[i] != 0 || edited_[pair.other] != 0;
   }
 }
 

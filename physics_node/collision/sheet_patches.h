@@ -1,14 +1,15 @@
-// Broad phase of contact between sheets and of a sheet with itself: which patches of cells may touch.
+// Broad phase of contact between sheets, and of a sheet with itself if that is wanted: which patches of cells may
+// touch.
 //
 // A sheet is divided into patches. Two patches that do not adjoin keep a room to move: at an evaluation the distance of
 // their boxes, less the reach of the search, is divided between them by their speeds, and neither is evaluated again
 // before it has used its share. So for every such pair, with movement m since the evaluation,
 //
-//   room_a - m_a + room_b - m_b <= gap - kReach
+//   room_a - m_a + room_b - m_b <= gap - reach
 //
 // Patches that adjoin, and a patch with itself, can touch only where the sheet is folded back or cut:
 //
-//   angle(axis_a, axis_b) + half_a + half_b >= kFolded       axis, half: a cone around the patch's normals
+//   angle(axis_a, axis_b) + half_a + half_b >= 150 degrees       axis, half: a cone around the patch's normals
 //
 // A flat sheet thus costs a sum per patch and step. Pairs that may touch are searched when they have moved by
 // kSearchTravel. Everything is serial and in fixed order: no result depends on threads.
@@ -53,7 +54,7 @@ class SheetPatches {
   struct Cone {
     Vec3f axis = Vec3f::UnitZ();
     float cos_half = 1, sin_half = 0;
-    bool wide = false;  ///< Of more than kFolded across, or unknown.
+    bool wide = false;  ///< Of more than 150 degrees across, or unknown.
     /// The normals of both are so different that the areas may face each other.
     [[nodiscard]] bool Faces(const Cone& other) const;
   };
@@ -75,9 +76,11 @@ class SheetPatches {
   /// `distance`: largest distance at which sheets touch [m].
   SheetPatches(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles, float distance);
 
+  /// Whether patches of one sheet are pairs as well; no before the first call. To be followed by Restart.
+  void WithinSheets(bool within) { within_ = within; }
   /// Once a step: finds the pairs. `moved` as in TissueCollision::FindPairs.
   void Move(std::span<const float> moved);
-  /// After a change of any position that Move was not told of.
+  /// After a change of any position that is not in Move's argument.
   void Restart();
   /// After edits of the topology.
   void Follow(std::span<const Index> edited_edges);
@@ -139,7 +142,8 @@ class SheetPatches {
   void Fit(Index patch);
   void Evaluate(Index patch);
   void FindFolds(Index patch);
-  void Keep(Index a, Index b, bool adjoins);
+  /// False: there are too many pairs.
+  bool Keep(Index a, Index b, bool adjoins);
   void Drop(Index a, Index b);
 
   const TissueModel* model_;
@@ -151,12 +155,13 @@ class SheetPatches {
   std::vector<Area> strips_;
   std::vector<std::array<float, ParticleStore::kBlocksPerRow>> strip_moved_;
   std::vector<Patch> patches_;
+  std::vector<std::uint8_t> edited_;  ///< By patch: an edge of it was severed in this call of Follow.
   /// By patch: boxes, movement since they were fitted, in this step, and room to move [m].
   std::array<std::vector<float>, 3> low_, high_;
   std::vector<float> age_, step_, room_, gap_;
   std::size_t pair_count_ = 0;
   std::uint32_t steps_ = 1;
-  bool moving_ = false;
+  bool moving_ = false, within_ = false;
 };
 
 }  // namespace fulcrum::physics

@@ -54,7 +54,6 @@ void SheetCollision::SearchTile(const SheetPatches::Tile& nodes, const SheetPatc
         const float most = reach + all[i].radius;
         if ((p - all[i].centre).squaredNorm() > most * most) continue;
         const std::uint32_t apart = CellsBetween(node, all[i].row, all[i].col);
-        if (apart != kNoIndex && pairs_ != SheetPairs::kAll) continue;
         if (apart == 0 || (apart < kNeighbourCells && !cut)) continue;
         for (const Index half : {0u, 1u}) {
           const Index t = 2 * (all[i].row * (cols_ - 1) + all[i].col) + half;

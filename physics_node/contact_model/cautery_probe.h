@@ -55,10 +55,10 @@ class CauteryProbe {
   void SetStations(const ToolDescription& tool);
   void FollowSheet(const ToolPose& pose, std::uint32_t tool, const ToolCollision& collision);
   void SignHeights();
+  /// Thickness of the sheet of a cell [m]; without one that of `thermal`.
+  [[nodiscard]] float ThicknessAt(Index cell) const;
   /// Mean place of the metal within the gap that conducts, weighted by (limit - distance)^2 and by the
   /// length that it covers. False: there is none.
-  /// Of the sheet of a cell [m]; without one that of `thermal`.
-  [[nodiscard]] float ThicknessAt(Index cell) const;
   bool FindCentre(float radius_m, float step_s, Vec2f* centre);
   /// Gaps of the cells around `centre` from the metal.
   void FillFootprint(const ToolPose& pose, const ToolDescription& tool, const ToolCollision& collision,

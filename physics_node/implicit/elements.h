@@ -117,7 +117,7 @@ class Elements {
   [[nodiscard]] static float ContactStiffness(const ContactRow& row);
   /// Of tissue with tissue, not with a tool.
   [[nodiscard]] static bool IsTissue(const ContactRow& row);
-  /// Of a sheet with itself or another.
+  /// Of a sheet with another, or with itself (SheetPairs::kAll).
   [[nodiscard]] static bool IsOfSheets(const ContactRow& row);
 
  private:

@@ -281,9 +281,9 @@ Vec3f ImplicitSolver::ForceOn(ParticleRef at) const { return FieldAt(state_.line
 Vec3f ImplicitSolver::Velocity(ParticleRef at) const { return FieldAt(state_.velocity.data(), at); }
 void ImplicitSolver::SetVelocity(ParticleRef at, const Vec3f& v) {
   PutField(state_.velocity.data(), at, v);
-  state_.elements.RestartSlides();
   state_.regions.Wake(model_.partition.Of(at));
 }
+void ImplicitSolver::RestartSlides() { state_.elements.RestartSlides(); }
 void ImplicitSolver::SleepStill() {
   state_.regions.SleepStill([&](int region) {
     bool still = true;

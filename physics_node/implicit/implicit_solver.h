@@ -63,6 +63,8 @@ class ImplicitSolver {
   void Stop();
   /// Velocities from two states a step apart, for a restart. Wakes.
   void SetVelocity(ParticleRef at, const Vec3f& v);
+  /// After positions were set: where solids slide on each other is not known any more.
+  void RestartSlides();
 
   /// Force over displacement [N/m], from the last substep's linearisation, without contacts. Costs two iterations and a
   /// product, so the first answer to a new query at rest is too large; it improves when the query is repeated. False:

@@ -5,10 +5,12 @@
 #include <limits>
 
 #include "physics_node/collision/closest.h"
+#include "physics_node/implicit/kernels.h"
 
 namespace fulcrum::physics::implicit {
 namespace {
 
+constexpr std::uint32_t kFloats = kVertexFloats;  ///< Of a vertex in a field.
 /// Rings of triangles that a nearest point crosses in one substep at most.
 constexpr int kMostRings = 8;
 /// Nearer than this the direction to a point on a rim is rounding, and the normal of the triangle replaces it [m].
@@ -52,21 +54,25 @@ Slides::Slides(const ElasticModel& model, const ParticleStore& particles) : tria
 }
 
 void Slides::Restart() {
-  for (Slide& slide : slides_) slide.triangle = slide.rest;
+  for (Slide& slide : slides_) slide.triangle = kNoIndex;
 }
 
 std::array<Vec3f, 3> Slides::Corners(const float* place, Index triangle) const {
   std::array<Vec3f, 3> corners;
-  for (std::size_t k = 0; k < 3; ++k) corners[k] = FieldAt(place, {4 * triangles_[triangle][k]});
+  for (std::size_t k = 0; k < 3; ++k) corners[k] = FieldAt(place, {kFloats * triangles_[triangle][k]});
   return corners;
 }
 
-Slides::Foot Slides::FootOf(const float* place, const Vec3f& p, Index triangle) const {
+Slides::Foot Slides::FootOf(const float* place, const Slide& slide) const {
+  const Vec3f p = FieldAt(place, slide.vertex);
+  const bool known = slide.triangle != kNoIndex;
   Foot foot;
-  foot.triangle = triangle;
+  foot.triangle = known ? slide.triangle : slide.rest;
   float nearest_sq = std::numeric_limits<float>::max(), height = 0;
   Vec3f along = Vec3f::Zero();  // From the nearest point to p.
-  for (int ring = 0; ring < kMostRings; ++ring) {
+  // The distance falls from ring to ring, so that the walk ends.
+  const int most_rings = known ? kMostRings : std::numeric_limits<int>::max();
+  for (int ring = 0; ring < most_rings; ++ring) {
     const Index from = foot.triangle;
     // The triangle itself is evaluated in the first step only.
     for (Index i = ring_start_[from] + (ring > 0 ? 1 : 0); i < ring_start_[from + 1]; ++i) {
@@ -102,16 +108,16 @@ void Slides::Linearise(const float* place, const Regions& regions) {
     const auto is_computed = [&](ParticleRef at) { return regions.computed(regions.partition().Of(at)); };
     if (!regions.all_computed() && std::none_of(e.at.begin(), e.at.end(), is_computed)) continue;
     acts_.push_back(i);
-    const Foot foot = FootOf(place, FieldAt(place, slide.vertex), slide.triangle);
+    const Foot foot = FootOf(place, slide);
     const float stretch = foot.gap_m - slide.gap_m;
-    if (!std::isfinite(stretch)) {  // Of a particle that is reset at the end of the substep.
+    if (foot.normal.isZero(0.0f) || !std::isfinite(stretch)) {  // A particle that is reset at the end of the substep.
       force_[i] = e.kt = 0.0f;
       e.m.setZero();
       continue;
     }
     slide.triangle = foot.triangle;
     for (std::size_t k = 0; k < 3; ++k) {
-      e.at[k + 1] = {4 * triangles_[foot.triangle][k]};
+      e.at[k + 1] = {kFloats * triangles_[foot.triangle][k]};
       e.weight[k + 1] = -foot.barycentric[k];
     }
     const bool is_on_rim = !foot.is_inside && std::abs(foot.gap_m) > kTouching_m;
@@ -148,7 +154,7 @@ double Slides::Energy(const float* place) const {
   double sum = 0;
   for (const std::uint32_t i : acts_) {
     const Slide& slide = slides_[i];
-    const float stretch = FootOf(place, FieldAt(place, slide.vertex), slide.triangle).gap_m - slide.gap_m;
+    const float stretch = FootOf(place, slide).gap_m - slide.gap_m;
     sum += 0.5 * static_cast<double>(slide.stiffness * stretch * stretch);
   }
   return sum;

@@ -28,7 +28,7 @@ class Slides {
   Slides(const ElasticModel& model, const ParticleStore& particles);
 
   [[nodiscard]] bool empty() const { return slides_.empty(); }
-  /// The nearest points are looked for from where they are at rest: positions have been set.
+  /// The nearest points are looked for from where they are at rest, over the whole surface: positions have been set.
   void Restart();
   /// Finds the nearest points at `place`, and which slides join particles that are computed.
   void Linearise(const float* place, const Regions& regions);
@@ -49,7 +49,7 @@ class Slides {
   struct Slide {
     ParticleRef vertex;
     float gap_m = 0, stiffness = 0;  ///< At rest [m]; [N/m]
-    Index rest = 0, triangle = 0;    ///< Of triangles_: the nearest one at rest, and now.
+    Index rest = 0, triangle = 0;    ///< Of triangles_: the nearest one at rest, and now; kNoIndex: not known.
     Vec3f rest_normal = Vec3f::UnitZ();
   };
   struct Foot {
@@ -60,8 +60,8 @@ class Slides {
     bool is_inside = false;        ///< Of the triangle, not on its rim.
   };
   [[nodiscard]] std::array<Vec3f, 3> Corners(const float* place, Index triangle) const;
-  /// Walks over the surface from `triangle`.
-  [[nodiscard]] Foot FootOf(const float* place, const Vec3f& p, Index triangle) const;
+  /// Walks over the surface from the slide's triangle.
+  [[nodiscard]] Foot FootOf(const float* place, const Slide& slide) const;
 
   std::vector<Slide> slides_;
   std::vector<Element> elements_;    ///< By slide.

@@ -462,6 +462,7 @@ bool TissueSimulation::Restore(std::span<const float> xyz, std::span<const float
       const ParticleRef at = particles_.Ref(p);
       implicit_->SetVelocity(at, (particles_.At(at) - particles_.Previous(at)) / step_s());
     }
+    implicit_->RestartSlides();
   }
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     tracks_[i] = {memory.known[i], memory.pose[i], memory.pose[i]};

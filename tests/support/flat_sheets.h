@@ -59,10 +59,10 @@ inline scene::SceneData SheetAndBand(double gap_m, const Vec3f& gravity = Vec3f:
 }
 
 /// Lets the held nodes of a sheet move.
-inline void Free(scene::SceneData* data, const SheetPart& sheet, std::uint32_t first_row = 0) {
+inline void Free(scene::SceneData* data, const SheetPart& sheet) {
   const SceneView scene = data->View();
   const float inner = scene.inverse_mass[SheetParticle(scene, sheet, sheet.rows / 2, sheet.cols / 2)];
-  for (std::uint32_t row = first_row; row < sheet.rows; ++row) {
+  for (std::uint32_t row = 0; row < sheet.rows; ++row) {
     for (std::uint32_t col = 0; col < sheet.cols; ++col) {
       float& w = data->inverse_mass[SheetParticle(scene, sheet, row, col)];
       if (!(w > 0.0f)) w = inner;

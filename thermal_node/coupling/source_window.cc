@@ -70,7 +70,7 @@ Tile* SourceWindow::TileAt(HeatField* field, int ix, int iy) const {
 }
 
 /// Visits every run of cells of one window row within one tile: visit(tile, cell in tile, cell in window, count). Cells
-/// beyond the sheet are visited or of another material with tile == nullptr.
+/// beyond the sheet or of another material are visited with tile == nullptr.
 template <class Visit>
 void SourceWindow::ForTileRows(HeatField* field, const Visit& visit) {
   const auto place = [](int cell) { return ((cell % kTile) + kTile) % kTile; };  // in its tile

@@ -159,13 +159,27 @@ void AddToHash(std::span<const Attachment> attachments, Hash64* hash) {
   if (slides) hash->Add(std::as_bytes(std::span<const Vec3f>(normals)));
 }
 
+void AddToHash(std::span<const SheetPart> sheets, Hash64* hash) {
+  constexpr std::size_t kOfTissue_B = offsetof(SheetPart, thickness_m);
+  std::vector<std::byte> of_tissue, of_heat;
+  bool own = false;
+  for (const SheetPart& sheet : sheets) {
+    const auto bytes = std::as_bytes(std::span(&sheet, 1));
+    of_tissue.insert(of_tissue.end(), bytes.begin(), bytes.begin() + kOfTissue_B);
+    of_heat.insert(of_heat.end(), bytes.begin() + kOfTissue_B, bytes.end());
+    own = own || sheet.thickness_m != 0.0f || sheet.conductivity_W_mK != 0.0f || sheet.sigma_S_m != 0.0f;
+  }
+  hash->Add(std::span<const std::byte>(of_tissue));
+  if (own) hash->Add(std::span<const std::byte>(of_heat));
+}
+
 std::uint64_t ContentHash(const SceneView& view) {
   Hash64 hash;
   hash.AddValue(kSceneContentVersion);
   const FixedPart fixed = ToFixed(view);
   hash.Add(std::as_bytes(std::span(&fixed, 1)));
   const auto add = [&]<class T>(const char*, std::span<const T> span) {
-    if constexpr (std::is_same_v<T, Attachment>) {
+    if constexpr (std::is_same_v<T, Attachment> || std::is_same_v<T, SheetPart>) {
       AddToHash(span, &hash);
     } else {
       hash.Add(std::as_bytes(span));

@@ -56,6 +56,8 @@ struct SceneData {
 [[nodiscard]] std::uint64_t ContentHash(const SceneView& view);
 /// What it takes of attachments: normals only if there are any, so that scenes without keep their hash.
 void AddToHash(std::span<const Attachment> attachments, Hash64* hash);
+/// Likewise of sheets: what concerns heat only if one has values of its own.
+void AddToHash(std::span<const SheetPart> sheets, Hash64* hash);
 
 /// Checks the scene and writes it atomically (temporary file, then rename). Returns the content hash.
 /// Throws InputError.

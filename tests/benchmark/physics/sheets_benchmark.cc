@@ -1,5 +1,6 @@
-// Contact of sheets with each other and themselves: what it costs in the script of the built-in scene and where a band
-// is pressed onto a sheet, as a ratio of run times in one process, and how deep the sheets then are in each other.
+// Contact of sheets with each other and, unlike in a session, with themselves: what it costs in the script of the
+// built-in scene and where a band is pressed onto a sheet, as a ratio of run times in one process, and how deep the
+// sheets then are in each other.
 #include <algorithm>
 #include <chrono>
 #include <vector>

@@ -69,10 +69,10 @@ void Reseal(Bytes* file) {
   scene::ForEachBodySection(view, [&]<class T>(const char* name, std::span<const T>&) {
     const std::span<const std::byte> bytes = named(name);
     if (bytes.empty()) return;
-    if constexpr (std::is_same_v<T, Attachment>) {
-      std::vector<Attachment> attachments(bytes.size() / sizeof(Attachment));
-      std::memcpy(static_cast<void*>(attachments.data()), bytes.data(), attachments.size() * sizeof(Attachment));
-      scene::AddToHash(attachments, &content);
+    if constexpr (std::is_same_v<T, Attachment> || std::is_same_v<T, SheetPart>) {
+      std::vector<T> elements(bytes.size() / sizeof(T));
+      std::memcpy(static_cast<void*>(elements.data()), bytes.data(), elements.size() * sizeof(T));
+      scene::AddToHash(elements, &content);
     } else {
       content.Add(bytes);
     }

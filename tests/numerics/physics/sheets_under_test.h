@@ -1,4 +1,4 @@
-// The accurate mode with contact of sheets with each other and themselves.
+// The accurate mode with contact of sheets with each other.
 #pragma once
 
 #include <vector>
@@ -11,9 +11,7 @@ namespace fulcrum::physics {
 class SheetsUnderTest final : public AccurateUnderTest {
  public:
   explicit SheetsUnderTest(const SceneView& scene)
-      : AccurateUnderTest(scene), collision_(scene, &tissue_, &particles_) {
-    collision_.Take(SheetPairs::kAll);
-  }
+      : AccurateUnderTest(scene), collision_(scene, &tissue_, &particles_) {}
 
  private:
   void FindPairs(std::span<const float> moved) override { collision_.FindPairs(moved); }

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <filesystem>
 #include <functional>
+#include <array>
 #include <numbers>
+#include <set>
 
 #include "services/base/core/error.h"
 #include "services/base/core/solids.h"
@@ -139,6 +141,30 @@ TEST(Attachments, GluedOnesAreHashedWithoutTheirNormals) {
   before.Add(std::span<const std::byte>(bytes));
   AddToHash(glued.attachments, &now);
   EXPECT_EQ(now.value(), before.value());
+}
+
+TEST(Sheets, AreHashedWithoutHeatOfTheirOwnUnlessOneHasIt) {
+  std::array<SheetPart, 2> sheets{SheetPart{"a", 0, 9, 9, 0}, SheetPart{"b", 17, 9, 9, 0}};
+  const auto hash_of = [&] {
+    Hash64 hash;
+    AddToHash(sheets, &hash);
+    return hash.value();
+  };
+  std::vector<std::byte> bytes;  // As of a scene file before version 16.
+  for (const SheetPart& sheet : sheets) {
+    const auto of = std::as_bytes(std::span(&sheet, 1)).first(64);
+    bytes.insert(bytes.end(), of.begin(), of.end());
+  }
+  Hash64 before;
+  before.Add(std::span<const std::byte>(bytes));
+  EXPECT_EQ(hash_of(), before.value());
+  std::set<std::uint64_t> different{before.value()};
+  for (float SheetPart::*own : {&SheetPart::thickness_m, &SheetPart::conductivity_W_mK, &SheetPart::sigma_S_m}) {
+    sheets[1].*own = 0.4f;
+    different.insert(hash_of());
+    sheets[1].*own = 0;
+  }
+  EXPECT_EQ(different.size(), 4u);
 }
 
 TEST(Attachments, StayWithinARegion) {
