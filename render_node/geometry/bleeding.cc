@@ -9,7 +9,9 @@
 namespace fulcrum::render {
 namespace {
 
-constexpr int kMostSteps = 50;  // Maximum number of steps per update; the rest of a longer pause is skipped.
+// Maximum number of steps per update; the rest of a longer pause is skipped. More than from one ageing to the next, or
+// blood at rest, which is updated only to age, would age late.
+constexpr int kMostSteps = 150;
 constexpr double kClots_s = 8;  // Assumed: after this time a small vessel has closed by itself.
 // Assumed: a small arteriole of the peritoneum, 1.2 ml in a minute; it pulses 72 times in a minute by a half.
 constexpr double kBleeds_m3_s = 20e-9;
@@ -59,7 +61,7 @@ void Bleeding::Cut(const Vec2f& material, const Atlas& atlas, double session_tim
   });
   if (known) return;
   if (!moves() && fluid_.dry()) time_s_ = session_time_s;
-  sources_[next_source_] = {true, *best, 0};
+  sources_[next_source_] = {true, *best, 0, session_time_s};
   next_source_ = (next_source_ + 1) % sources_.size();
 }
 
@@ -74,10 +76,11 @@ bool Bleeding::Update(double session_time_s, const MembraneMesh& membrane, std::
     return false;
   }
   fluid_.SetShape(membrane);
+  static_assert(kMostSteps > kStepsOfAge);
   time_s_ = std::max(time_s_, session_time_s - kMostSteps * SheetFluid::kStep_s);
   for (; time_s_ + SheetFluid::kStep_s <= session_time_s; time_s_ += SheetFluid::kStep_s) {
     for (Source& source : sources_) {
-      if (source.open) Bleed(&source, *atlas);
+      if (source.open && source.opened_s <= time_s_) Bleed(&source, *atlas);
     }
     fluid_.Step(tubes);
     if (++step_ < kStepsOfAge) continue;

@@ -35,7 +35,8 @@ class Bleeding {
   [[nodiscard]] bool moves() const { return sources() > 0 || fluid_.flows(); }
   /// At rest, but so long after the last time that clots look older.
   [[nodiscard]] bool AgesAt(double session_time_s) const {
-    return fluid_.ages() && session_time_s >= time_s_ + (kStepsOfAge - step_) * SheetFluid::kStep_s;
+    // Half a step later, so that Update makes all of the steps, rounded as its times are.
+    return fluid_.ages() && session_time_s >= time_s_ + (kStepsOfAge - step_ + 0.5) * SheetFluid::kStep_s;
   }
   [[nodiscard]] const SheetFluid& fluid() const { return fluid_; }
   [[nodiscard]] double shed_m3() const { return shed_m3_; }  ///< By all sources since the start.
@@ -45,7 +46,8 @@ class Bleeding {
   struct Source {
     bool open = false;
     Vec2f material = Vec2f::Zero();
-    int steps = 0;  // Steps since it opened.
+    int steps = 0;        // Steps since it opened.
+    double opened_s = 0;  // Session time of the cut [s].
   };
   [[nodiscard]] float VesselAt(const Vec2f& material) const;
   /// The strongest vessel in living tissue beside a place; none if there is none.

@@ -34,7 +34,7 @@ constexpr float kClotDraws = 0.03f;     // A clot is drawn so much more slowly, 
 constexpr float kClotReach_m = 0.001f;
 constexpr float kJet_m = 0.06f;  // A jet that meets no tissue so far ahead meets none.
 constexpr float kJetRadius_m = 0.003f, kJetWidens = 0.05f;
-constexpr float kWetting_m_s = 0.012f;  // Of the jet so much stays on the tissue; the rest splashes off, clear.
+constexpr float kWetting_m_s = 0.012f;  // Assumed: the jet leaves so much in its middle; the rest splashes off, clear.
 constexpr float kJetDepth_m = 0.0012f;  // The jet drives thicker liquid off.
 constexpr float kLoosens_s = 6;         // Time constant with which the jet breaks a clot up.
 constexpr float kClots_s = 90;          // Time constants, assumed: of undiluted blood to clot,
@@ -79,6 +79,7 @@ void SheetFluid::MakeCells() {
   steepness_.assign(count, 1.0f);
   rough_.assign(count, std::numeric_limits<float>::quiet_NaN());
   level_.assign(count, 0.0f);
+  rested_z_.assign(count, 0.0f);
   of_.assign(count, 0);
   is_wet_.assign(count, 0);
   const auto first = [](float low) { return std::max(0, static_cast<int>(low - 0.5f)); };
@@ -142,11 +143,11 @@ double SheetFluid::Bleed(const Vec2f& material, double volume_m3) {
 void SheetFluid::SetShape(const MembraneMesh& membrane) {
   sheet_ = &membrane;
   ++shape_;
-  constexpr float kMoved_m = 2e-5f;  // Of one cell against its place before.
+  // Of one cell against its height when all came to rest, so that slow motion adds up.
+  constexpr float kMoved_m = 2e-5f;
   for (const Cell cell : wet_) {
-    const float before = place_[cell].z();
     FindShapeAround(cell);
-    flows_ = flows_ || std::abs(place_[cell].z() - before) > kMoved_m;
+    flows_ = flows_ || std::abs(place_[cell].z() - rested_z_[cell]) > kMoved_m;
   }
 }
 
@@ -186,6 +187,8 @@ void SheetFluid::Step(std::span<const WorkingTube> tubes) {
   for (int k = 0; k < kSubsteps; ++k) Flow();
   for (const Cell cell : wet_) Changed(cell);
   DropDry();
+  if (flows_) return;
+  for (const Cell cell : wet_) rested_z_[cell] = place_[cell].z();
 }
 
 void SheetFluid::DropDry() {
@@ -307,8 +310,6 @@ void SheetFluid::Irrigate(const WorkingTube& tube) {
   const Vec2f centre = scene_.membrane_material[node] / cell_m_;
   const float ahead = std::max(0.0f, (sheet_->positions()[node] - tube.tip_W).dot(tube.axis_W));
   const float radius_m = kJetRadius_m + kJetWidens * ahead, radius = radius_m / cell_m_;
-  // A paraboloid over the disc: twice the mean in its middle.
-  const float middle_m = 2 * kIrrigation_m3_s * kStep / (3.14159f * radius_m * radius_m);
   const auto from = [radius](float middle) { return std::max(0, static_cast<int>(middle - radius)); };
   const auto to = [radius](float middle, int count) { return std::min(count - 1, static_cast<int>(middle + radius)); };
   for (int y = from(centre.y()); y <= to(centre.y(), height_); ++y) {
@@ -318,7 +319,7 @@ void SheetFluid::Irrigate(const WorkingTube& tube) {
       const Cell cell = CellOf(x, y);
       if (r2 >= 1 || !Tissue(cell)) continue;
       Column& column = columns_[cell];
-      column.water += std::min(middle_m, kWetting_m_s * kStep) * (1 - r2);
+      column.water += kWetting_m_s * kStep * (1 - r2);
       const float loosened = Share(kStep * (1 - r2), kLoosens_s) * column.clot;
       column.clot -= loosened;
       column.blood += loosened;

@@ -110,6 +110,7 @@ class SheetFluid {
   std::vector<float> steepness_;      // |z of its normal|, at least kSteepest.
   std::vector<float> rough_;          // Its unevenness [m]; NaN: not known yet.
   std::vector<float> level_;          // z of the liquid's surface [m].
+  std::vector<float> rested_z_;       // z of the place when all came to rest; known where it was wet then [m].
   std::vector<std::uint32_t> of_;     // Shape for which the place is known: the value of shape_.
   std::vector<std::uint8_t> is_wet_;  // In wet_.
   std::vector<Cell> wet_;

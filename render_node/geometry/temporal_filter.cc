@@ -66,7 +66,7 @@ void TemporalFilter::SetSize(int width, int height, int picture_width, int pictu
   period_ = JitterPeriod(static_cast<float>(picture_height) / static_cast<float>(height));
   const std::size_t pixels = TexelIndex(0, height, width), of_picture = TexelIndex(0, picture_height, picture_width);
   next_.assign(of_picture, 0);
-  changes_.assign(of_picture, kSame);
+  for (std::vector<std::uint8_t>* each : {&changes_, &since_, &own_, &across_}) each->assign(of_picture, kSame);
   shown_.assign(pixels, 0);
   sums_.assign(4 * pixels, 0);
   was_alone_.assign(TexelIndex(0, height, (width + kSpan - 1) / kSpan), 1);
@@ -89,10 +89,15 @@ void TemporalFilter::SetSize(int width, int height, int picture_width, int pictu
   Forget();
 }
 
-// For each pixel of the picture the largest change from `before` among it and its neighbours.
+void TemporalFilter::Forget() {
+  known_ = 0;
+  std::ranges::fill(since_, std::uint8_t{0});
+}
+
+// For each pixel of the picture the largest change from `before` among it and its neighbours. One that has moved within
+// the last period counts as moving, though it may show the same as a period before: the mean still has what it showed.
 void TemporalFilter::FindChanges(const std::vector<std::uint32_t>& before) {
   const auto width = static_cast<std::size_t>(picture_width_);
-  std::vector<std::uint8_t> own(next_.size()), across(next_.size());
   for (std::size_t k = 0; k < next_.size(); ++k) {
     const std::uint32_t a = next_[k], b = before[k];
     std::uint32_t most = 0;
@@ -100,13 +105,15 @@ void TemporalFilter::FindChanges(const std::vector<std::uint32_t>& before) {
       const auto d = static_cast<int>(a >> shift & 0xff) - static_cast<int>(b >> shift & 0xff);
       most |= static_cast<std::uint32_t>(d < 0 ? -d : d);
     }
-    own[k] = static_cast<std::uint8_t>((most != 0 ? 1 : 0) + ((most & kMoved) != 0 ? 1 : 0));
+    const int same = (most & kMoved) != 0 ? 0 : std::min(since_[k] + 1, period_);
+    since_[k] = static_cast<std::uint8_t>(same);
+    own_[k] = same < period_ ? kMovedOn : most != 0 ? kSlight : kSame;
   }
-  across = own;
-  for (std::size_t k = 1; k + 1 < own.size(); ++k) across[k] = std::max(std::max(own[k - 1], own[k]), own[k + 1]);
-  changes_ = across;
-  for (std::size_t k = width; k + width < own.size(); ++k) {
-    changes_[k] = std::max(std::max(across[k - width], across[k]), across[k + width]);
+  across_ = own_;
+  for (std::size_t k = 1; k + 1 < own_.size(); ++k) across_[k] = std::max(std::max(own_[k - 1], own_[k]), own_[k + 1]);
+  changes_ = across_;
+  for (std::size_t k = width; k + width < own_.size(); ++k) {
+    changes_[k] = std::max(std::max(across_[k - width], across_[k]), across_[k + width]);
   }
 }
 
@@ -118,7 +125,9 @@ void TemporalFilter::Add(bool still) {
   }
   if (still || known_ < period_) {
     // The mean is complete, or not.
-    std::ranges::fill(changes_, static_cast<std::uint8_t>(still && known_ + 1 >= period_ ? kSlight : kMovedOn));
+    const bool complete = still && known_ + 1 >= period_;
+    std::ranges::fill(changes_, static_cast<std::uint8_t>(complete ? kSlight : kMovedOn));
+    if (complete) std::ranges::fill(since_, static_cast<std::uint8_t>(period_));
   } else {
     FindChanges(phase.picture);
   }

@@ -1,9 +1,11 @@
 // Smooth edges at one sample a pixel, where nothing moves: the mean of the last pictures of the scene, each of which
 // shows it at another place within a pixel (temporal anti-aliasing), with more pixels than a single picture has.
 //
-// The places repeat after a period. Where a picture equals the one a period before, nothing has moved since, and the
-// mean of the period is shown; elsewhere the picture alone. So nothing is smeared or follows late, and what is shown
-// depends on the pictures of one period only. Pure; integers and single products, so every CPU gives the same bytes.
+// The places repeat after a period. Where each picture of the last period equals the one a period before it, nothing
+// has moved in that time, and the mean of the period is shown; elsewhere the picture alone. So what moves is not
+// smeared and does not follow late. Differences of less than 8 of 255 do not count as motion: such slow changes of
+// colour follow over a period. What is shown depends on the pictures of two periods only. Pure; integers and single
+// products, so every CPU gives the same bytes.
 #pragma once
 
 #include <array>
@@ -26,7 +28,7 @@ class TemporalFilter {
   /// Sizes of the mean and of the pictures [pixels]. Forgets all pictures.
   void SetSize(int width, int height, int picture_width, int picture_height);
   /// Forgets all pictures: what comes is seen by another camera.
-  void Forget() { known_ = 0; }
+  void Forget();
 
   /// Shift of the next picture [its pixels].
   [[nodiscard]] Vec2f jitter() const { return JitterOf(known_ % period_, period_); }
@@ -62,10 +64,14 @@ class TemporalFilter {
   int known_ = 0;  // Pictures since the last Forget().
   std::vector<Phase> phases_;
   std::vector<std::uint32_t> next_, shown_;
-  std::vector<std::int32_t> sums_;       // Of the phases' pictures times their weights, four channels a pixel.
-  std::vector<float> per_weight_;        // 1 / the sum of the weights, for each pixel of the mean.
-  std::vector<std::uint8_t> changes_;    // Of the picture's pixels and their neighbours: kSame …
-  std::vector<std::uint8_t> was_alone_;  // Of blocks of the mean: shows the last picture alone somewhere.
+  std::vector<std::int32_t> sums_;     // Of the phases' pictures times their weights, four channels a pixel.
+  std::vector<float> per_weight_;      // 1 / the sum of the weights, for each pixel of the mean.
+  std::vector<std::uint8_t> changes_;  // Of the picture's pixels and their neighbours: kSame …
+  // Of the picture's pixels: number of pictures in a row that show the same as a period before, up to period_. A thing
+  // that covers a pixel in one picture only is in the mean until that picture's place comes again.
+  std::vector<std::uint8_t> since_;
+  std::vector<std::uint8_t> own_, across_;  // Scratch of FindChanges: of each pixel itself, of it and those beside it.
+  std::vector<std::uint8_t> was_alone_;     // Of blocks of the mean: shows the last picture alone somewhere.
 };
 
 }  // namespace fulcrum::render

@@ -89,7 +89,8 @@ void RenderNode::Step(const Tick& tick) {
   if (streams_ && !streamed) changed_on_screen_ = true;
   const bool write = outlet_.has_folder() && (screenshot_ || (changed_in_file_ && session_time_s_ >= next_png_s_));
   screenshot_ = false;
-  const bool live = (window_ || streams_) && (changed_on_screen_ || view_.Refine());
+  const bool refined = (window_ || streams_) && view_.Refine();  // Also with a text that changes at each step.
+  const bool live = refined || ((window_ || streams_) && changed_on_screen_);
   if (write || live) {
     Draw(session_time_s_, write);
   } else if (view_.TubesWork()) {
@@ -158,10 +159,11 @@ void RenderNode::TakeTissue() {
 }
 
 // Samples that wait too long unread would count as lost. Of the streams the newest is read after the pause, but each
-// patch shows another place.
+// patch shows another place, and a tube whose handle is let go must stop.
 void RenderNode::PassOver() {
   (void)ports_.tools.TakeLatest(&new_tools_);
-  (void)ports_.handles.TakeLatest(&new_handles_);
+  if (!hud_.tube) (void)ports_.handles.TakeLatest(&new_handles_);
+  while (hud_.tube && ports_.handles.TakeNext(&new_handles_)) FollowValves();
   (void)ports_.contacts.TakeLatest(&contact_);
   (void)ports_.contact_models.TakeLatest(&contact_model_);
   while (ports_.patches.TakeNext(&patch_)) held_patches_[PlaceOf(patch_.header)] = patch_;
@@ -367,10 +369,12 @@ void RenderNode::Draw(double session_time_s, bool write_png, ReadBack read) {
   const auto start = std::chrono::steady_clock::now();
   const bool moving = view_.UpdateEffects(session_time_s);
   view_.SetScale(quality_.scale());
-  // A single file has no pictures shortly before it; a GPU draws many samples a pixel.
-  view_.SetSmoothed((window_ || streams_ || read == ReadBack::kAlways) && !display_.is_gpu() &&
+  // A file has no pictures shortly before it, unless a window or a reader of Picture is there, whose pictures it is
+  // one of; a GPU draws many samples a pixel.
+  view_.SetSmoothed((window_ || streams_ || read == ReadBack::kAlways) && display_.can_smooth() &&
                     shape_.width * shape_.height <= LaparoscopeView::kMostSmoothed);
   view_.Update();
+  const bool settles = view_.DrawsBackgroundAtRest();
   UpdateTexts();
   const PictureOutlet::Use use{write_png, streams_, session_time_s, streams_ ? HeaderNow() : PictureHeader()};
   if (read == ReadBack::kIfUsed && !write_png && !streams_) {
@@ -392,7 +396,8 @@ void RenderNode::Draw(double session_time_s, bool write_png, ReadBack read) {
   changed_on_screen_ = moving;
   frames_drawn_.fetch_add(1, std::memory_order_relaxed);
   const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
-  quality_.Add(spent.count());
+  // Of pictures that cost more for one period only, an eye that rests would go on at a coarser scale, and then back.
+  if (!settles) quality_.Add(spent.count());
   NoteLatency(spent.count());
   draw_ms_.store(spent.count(), std::memory_order_relaxed);
   scale_.store(quality_.scale(), std::memory_order_relaxed);

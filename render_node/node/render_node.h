@@ -64,7 +64,7 @@ class RenderNode {
   void Step(const Tick& tick);
 
   /// Moves smoke and blood on to the time of the last Step, for steps that draw nothing: otherwise they make up at most
-  /// a second when the next picture is drawn. Call from the thread of Step.
+  /// 3 s when the next picture is drawn. Call from the thread of Step.
   void FollowEffects();
 
   /// Draws into `picture`, for a program that shows a recording. False, and nothing is drawn, when nothing has changed

@@ -63,6 +63,13 @@ EGLDisplay DisplayOfMesa() {
 
 }  // namespace
 
+int GlVersion() {
+  GLint major = 0, minor = 0;
+  glGetIntegerv(GL_MAJOR_VERSION, &major);
+  glGetIntegerv(GL_MINOR_VERSION, &minor);
+  return 10 * major + minor;
+}
+
 EglContext::EglContext() {
   const std::vector<EGLDisplay> gpus = DisplaysOfGpus();
   // A GPU whose driver is missing or older than needed: the next one, and in the end software.
@@ -86,10 +93,8 @@ const char* EglContext::Open(void* display) {
   description_ = std::string(reinterpret_cast<const char*>(glGetString(GL_RENDERER))) + ", OpenGL " +
                  reinterpret_cast<const char*>(glGetString(GL_VERSION));
   // glCopyImageSubData; Mesa's software renderer has had it for years.
-  GLint major = 0, minor = 0;
-  glGetIntegerv(GL_MAJOR_VERSION, &major);
-  glGetIntegerv(GL_MINOR_VERSION, &minor);
-  is_recent_ = major > 4 || (major == 4 && minor >= 3);
+  version_ = GlVersion();
+  is_recent_ = version_ >= 43;
   Release();
   return nullptr;
 }

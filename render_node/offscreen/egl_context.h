@@ -6,6 +6,9 @@
 
 namespace fulcrum::render {
 
+/// Version of the current OpenGL context: 43 is 4.3.
+[[nodiscard]] int GlVersion();
+
 class EglContext {
  public:
   /// Makes a compatibility-profile OpenGL context. Throws std::runtime_error with one line that says which step failed
@@ -23,6 +26,8 @@ class EglContext {
 
   /// GL_RENDERER and GL_VERSION, for the log.
   [[nodiscard]] const std::string& description() const { return description_; }
+  /// As GlVersion().
+  [[nodiscard]] int version() const { return version_; }
 
  private:
   /// Makes the context; nullptr, or the step that failed.
@@ -32,6 +37,7 @@ class EglContext {
   void* display_ = nullptr;
   void* context_ = nullptr;
   std::string description_;
+  int version_ = 0;
   bool is_recent_ = false;  ///< OpenGL 4.3.
 };
 

@@ -14,6 +14,8 @@
 namespace fulcrum::render {
 namespace {
 
+constexpr int kSmoothsFrom = 45;  // OpenGL 4.5: ReadTexture and WriteTexture.
+
 void SetUpViewer(const LaparoscopeView& view, osgViewer::Viewer* viewer) {
   viewer->setThreadingModel(osgViewer::ViewerBase::SingleThreaded);
   viewer->setSceneData(view.root());
@@ -96,6 +98,7 @@ class OffscreenDisplay : public Display {
   [[nodiscard]] PixelBox picture() const override { return picture_; }
   [[nodiscard]] bool closed() const override { return false; }
   [[nodiscard]] bool is_gpu() const override { return IsGpu(context_.description()); }
+  [[nodiscard]] bool can_smooth() const override { return !is_gpu() && context_.version() >= kSmoothsFrom; }
   [[nodiscard]] std::string description() const override { return context_.description(); }
 
  private:
@@ -200,6 +203,7 @@ class WindowDisplay : public Display {
     }
     context_->makeCurrent();
     if (const auto* renderer = glGetString(GL_RENDERER)) is_gpu_ = IsGpu(reinterpret_cast<const char*>(renderer));
+    can_smooth_ = !is_gpu_ && GlVersion() >= kSmoothsFrom;
     context_->releaseContext();
     // The context is passed from the thread that opens the window to the thread that draws.
     viewer_.setReleaseContextAtEndOfFrameHint(true);
@@ -255,10 +259,11 @@ class WindowDisplay : public Display {
   void ToggleFullScreen() override { window_->ToggleFullScreen(); }
   [[nodiscard]] bool closed() const override { return viewer_.done(); }
   [[nodiscard]] bool is_gpu() const override { return is_gpu_; }
+  [[nodiscard]] bool can_smooth() const override { return can_smooth_; }
   [[nodiscard]] std::string description() const override { return "window"; }
 
  private:
-  bool is_gpu_ = false;
+  bool is_gpu_ = false, can_smooth_ = false;
   std::unique_ptr<PixelReader> reader_ = std::make_unique<PixelReader>();
   osg::ref_ptr<ReadAfterDraw> read_ = new ReadAfterDraw;
   osg::ref_ptr<Keyboard> keys_ = new Keyboard;

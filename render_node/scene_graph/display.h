@@ -37,6 +37,8 @@ class Display {
   [[nodiscard]] virtual bool closed() const = 0;
   /// A GPU draws, which has time to smooth edges.
   [[nodiscard]] virtual bool is_gpu() const = 0;
+  /// Software draws, with the functions that LaparoscopeView::SetSmoothed needs (OpenGL 4.5).
+  [[nodiscard]] virtual bool can_smooth() const { return false; }
   /// Renderer and version, for the log.
   [[nodiscard]] virtual std::string description() const = 0;
 };

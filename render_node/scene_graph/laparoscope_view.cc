@@ -318,6 +318,8 @@ void LaparoscopeView::SetSmoothed(bool on) { impl_->optics.SetSmoothed(on); }
 
 bool LaparoscopeView::Refine() { return impl_->optics.Refine(); }
 
+bool LaparoscopeView::DrawsBackgroundAtRest() const { return impl_->optics.DrawsBackgroundAtRest(); }
+
 void LaparoscopeView::Update() {
   impl_->ShowFat();
   if (impl_->layers.Update()) {

@@ -74,6 +74,8 @@ class LaparoscopeView {
   void SetSmoothed(bool on);
   /// Makes the next picture smoother while nothing changes; false if it would be the same as the last one.
   bool Refine();
+  /// The next picture draws a background for the smoothing though the camera rests, which ends after a period.
+  [[nodiscard]] bool DrawsBackgroundAtRest() const;
 
   /// Updates the meshes after SetTissue and SetTopology; separate, so that several changes need one update only.
   /// Without a change the next picture reuses the last one of the scene.

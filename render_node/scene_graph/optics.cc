@@ -373,6 +373,12 @@ bool Optics::Refine() {
   return true;
 }
 
+bool Optics::DrawsBackgroundAtRest() const {
+  return smoothed() && std::ranges::any_of(eyes_, [](const Eye& eye) {
+           return !eye.smoothed->moves() && eye.backgrounds[eye.used].target.camera->getNodeMask() != 0;
+         });
+}
+
 void Optics::Eye::Draw() {
   scene.camera->setNodeMask(~0u);
   Look();

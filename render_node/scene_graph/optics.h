@@ -36,6 +36,9 @@ class Optics {
   /// Draws the scene again, at other places within its pixels, while that still makes the mean of its pictures better.
   /// Returns false, and does nothing, if it would not, or if it is not smoothed.
   bool Refine();
+  /// An eye that rests draws a background of a new place within its pixels in the next picture: so is that of each
+  /// place, once.
+  [[nodiscard]] bool DrawsBackgroundAtRest() const;
   /// Moves the cameras; the size of the picture does not change. The backgrounds of the last two places are kept, for
   /// pictures of two cameras in turn.
   void SetEyes(std::span<const Laparoscope> eyes);

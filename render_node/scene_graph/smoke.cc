@@ -47,7 +47,7 @@ void Smoke::Add(const Vec3f& p_W, double session_time_s) {
 
 double Smoke::InGasAt(double session_time_s) const {
   const double clears_1_s =
-      1 / kClears_s + static_cast<double>(sinks_.size()) * static_cast<double>(kAspiredGas_m3_s) / kCavity_m3;
+      1 / kClears_s + static_cast<double>(sinks_.size()) * static_cast<double>(kAspiratedGas_m3_s) / kCavity_m3;
   return puffs_in_gas_ * std::exp(std::min(0.0, in_gas_s_ - session_time_s) * clears_1_s);
 }
 
@@ -78,7 +78,7 @@ void Smoke::Draw(double step_s, double session_time_s) {
         puff.born_s = -1e9;
         break;
       }
-      const float speed = std::min(kFastest_m_s, kAspiredGas_m3_s / (kSphere * distance * distance));
+      const float speed = std::min(kFastest_m_s, kAspiratedGas_m3_s / (kSphere * distance * distance));
       puff.drawn += std::min(1.0f, static_cast<float>(step_s) * speed / distance) * to;
     }
   }

@@ -18,8 +18,8 @@ class Smoke {
   /// Starts a puff at p_W [m], which replaces the oldest one. Calls within kLeastInterval of the last start are
   /// ignored.
   void Add(const Vec3f& p_W, double session_time_s);
-  /// Places of tubes that aspirate gas from this time on [m], frame W: it flows to them as to sinks, and what arrives
-  /// is gone. Call after Update for that time.
+  /// Places of tubes that aspirate gas from now on [m], frame W: it flows to them as to sinks, and what arrives is
+  /// gone. @param session_time_s that of the last Update.
   void SetSinks(std::span<const Vec3f> sinks_W, double session_time_s);
   /// Builds the squares for this time. Returns true while puffs are visible, and once after the last one has
   /// disappeared.

@@ -1,6 +1,7 @@
 // fulcrum doctor: each check of the machine prints ✓ or ✗ with its finding, and for ✗ a fix.
 #include <dlfcn.h>
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
@@ -107,6 +108,23 @@ Finding LockedMemory() {
           FixOfLimit("memlock unlimited", "IPC_LOCK")};
 }
 
+/// Reads from `file` until its end or `deadline`. Returns whether the end came.
+bool ReadUntil(std::chrono::steady_clock::time_point deadline, int file, std::string* text) {
+  for (;;) {
+    const auto left =
+        std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+    pollfd waited{file, POLLIN, 0};
+    const int ready = left.count() > 0 ? ::poll(&waited, 1, static_cast<int>(left.count())) : 0;
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready <= 0) return false;
+    char part[512];
+    const ssize_t count = ::read(file, part, sizeof(part));
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return true;
+    text->append(part, static_cast<std::size_t>(count));
+  }
+}
+
 /// What draws pictures off screen, as render_node chooses it in a session. Asked in a process of its own, because this
 /// program must also run on a machine without EGL.
 Finding OffScreenGl() {
@@ -125,15 +143,16 @@ Finding OffScreenGl() {
     return {false, error.what(), fix};
   }
   output.Close();  // Only the child writes, so reading ends with it.
+  // A driver may wait for a device for good.
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
   std::string text;
-  char part[512];
-  for (ssize_t count = 0; (count = ::read(said.get(), part, sizeof(part))) > 0;) {
-    text.append(part, static_cast<std::size_t>(count));
-  }
+  bool answered = ReadUntil(deadline, said.get(), &text);
   std::optional<runtime::ProcessEnd> end;
-  while (!(end = renderer.Poll())) {
+  while (answered && !(end = renderer.Poll())) {
+    answered = std::chrono::steady_clock::now() < deadline;
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
+  if (!answered) return {false, "no answer within 10 s", fix};  // The child is killed with its owner.
   // The answer is the last line; a driver may have written warnings before it.
   text.erase(text.find_last_not_of('\n') + 1);
   text.erase(0, text.rfind('\n') + 1);

@@ -10,25 +10,26 @@ namespace fulcrum {
 
 enum class TubeFlow : std::uint8_t { kNone, kAspirates, kIrrigates };
 
-/// "Irrigation systems with a minimal flow rate of 1 L/min are essential" in laparoscopic colorectal surgery
-/// (78stepshealth.us/laparoscopic-surgery/irrigationsuction.html). Aspired liquid and gas: assumed, of a tube of 5 mm.
-inline constexpr float kIrrigation_m3_s = 1e-3f / 60;
+/// Aspirated liquid and gas: assumed, of a tube of 5 mm.
 inline constexpr float kAspiration_m3_s = 2e-3f / 60;
-inline constexpr float kAspiredGas_m3_s = 20e-3f / 60;
+inline constexpr float kAspiratedGas_m3_s = 20e-3f / 60;
 
-/// The valve of one tube. Pure; a function of the handle's samples.
+/// The valve of one tube, shut until the handle has been let go once: a process that starts during a squeeze does not
+/// know which of the two it is. Pure; a function of the handle's samples.
 class TrumpetValve {
  public:
   static constexpr float kSqueezed_rad = 0.20f;  ///< Below it a handle is squeezed,
   static constexpr float kLetGo_rad = 0.35f;     ///< from here on let go; between the two it is what it was.
   static constexpr double kTwice_s = 0.6;        ///< A squeeze that begins so soon after the last one irrigates.
 
-  /// Takes a sample. @param time_s of any clock, not decreasing [s].
+  /// Takes a sample. @param time_s of any clock; where it goes back, the squeezes before are forgotten [s].
   TubeFlow Step(double time_s, float jaw_rad) {
-    if (flow_ != TubeFlow::kNone && jaw_rad >= kLetGo_rad) {
+    if (jaw_rad >= kLetGo_rad) {
+      let_go_ = true;
       flow_ = TubeFlow::kNone;
-    } else if (flow_ == TubeFlow::kNone && jaw_rad < kSqueezed_rad) {
-      flow_ = time_s - squeezed_s_ < kTwice_s ? TubeFlow::kIrrigates : TubeFlow::kAspirates;
+    } else if (let_go_ && flow_ == TubeFlow::kNone && jaw_rad < kSqueezed_rad) {
+      const double since_s = time_s - squeezed_s_;
+      flow_ = since_s >= 0 && since_s < kTwice_s ? TubeFlow::kIrrigates : TubeFlow::kAspirates;
       squeezed_s_ = time_s;
     }
     return flow_;
@@ -39,6 +40,7 @@ class TrumpetValve {
 
  private:
   TubeFlow flow_ = TubeFlow::kNone;
+  bool let_go_ = false;
   double squeezed_s_ = -1e9;  // Begin of the last squeeze.
 };
 

@@ -217,6 +217,9 @@ bool Window(Report* report) {
     return true;
   }
   ::setenv("DISPLAY", screen.display().c_str(), 1);
+  struct Unset {
+    ~Unset() { ::unsetenv("DISPLAY"); }  // The screen ends here, and sessions without a window follow.
+  } unset;
   const int seconds = report->quick() ? 12 : 20;
   // The scene asks for 15 pictures a second; here nothing but the machine limits them.
   testing::Cart cart("built-in", kDomain,

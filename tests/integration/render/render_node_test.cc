@@ -290,6 +290,10 @@ TEST_F(RenderNodeTest, ATubeIrrigatesAtTheSecondSqueezeAlsoWhenNoPictureIsDrawn)
   for (int k = 1; k <= 5; ++k) node->Step(At(3.35 + 0.02 * k));
   EXPECT_GT(water(), 100);
   EXPECT_LE(node->pictures_drawn(), drawn + 1);
+  EXPECT_TRUE(node->view().TubesWork());
+  node->Press('p');
+  squeeze(3.5, 0.7f), node->Step(At(3.55));
+  EXPECT_FALSE(node->view().TubesWork()) << "let go during a pause";
 }
 
 TEST(JpegEncoder, KeepsThePictureAndTheLimit) {

@@ -64,6 +64,7 @@ int main(int argc, char** argv) {
         const auto k = static_cast<std::size_t>(tool);
         if (view.tools[k].kind != ToolKind::kSuction) continue;
         TrumpetValve valve;
+        (void)valve.Step(time_s, TrumpetValve::kLetGo_rad);
         laparoscope.SetFlow(tool, valve.Step(time_s, moment.handles.handles[k].jaw_angle_rad), time_s);
       }
       (void)laparoscope.UpdateEffects(time_s);

@@ -41,7 +41,7 @@ TEST(SmokeTest, HazeChangesInStepsSoThatFewPicturesFollow) {
   EXPECT_LE(steps, 16);
 }
 
-TEST(SmokeTest, SuctionHalvesTheTimeInWhichTheHazeClears) {
+TEST(SmokeTest, SuctionClearsTheHazeInThreeFifthsOfTheTime) {
   Smoke left, drawn;
   const Vec3f sink(1, 0, 0);  // Far from the puffs.
   for (int k = 0; k < 100; ++k) {

@@ -20,6 +20,7 @@ TEST(TrumpetValve, ASqueezeAspiratesWhileItLasts) {
 
 TEST(TrumpetValve, ASecondSqueezeSoonAfterIrrigates) {
   TrumpetValve valve;
+  (void)valve.Step(0.5, kOpen);
   (void)valve.Step(1.0, kClosed);
   (void)valve.Step(1.2, kOpen);
   EXPECT_EQ(valve.Step(1.4, kClosed), TubeFlow::kIrrigates);
@@ -30,6 +31,7 @@ TEST(TrumpetValve, ASecondSqueezeSoonAfterIrrigates) {
 
 TEST(TrumpetValve, ALateSecondSqueezeAspirates) {
   TrumpetValve valve;
+  (void)valve.Step(0.5, kOpen);
   (void)valve.Step(1.0, kClosed);
   (void)valve.Step(1.2, kOpen);
   EXPECT_EQ(valve.Step(1.0 + TrumpetValve::kTwice_s, kClosed), TubeFlow::kAspirates);
@@ -39,6 +41,8 @@ TEST(TrumpetValve, BetweenTheTwoAnglesNothingChanges) {
   constexpr float kBetween = 0.5f * (TrumpetValve::kSqueezed_rad + TrumpetValve::kLetGo_rad);
   TrumpetValve valve;
   EXPECT_EQ(valve.Step(0, kBetween), TubeFlow::kNone);
+  (void)valve.Step(0.5, kOpen);
+  EXPECT_EQ(valve.Step(0.7, kBetween), TubeFlow::kNone);
   EXPECT_EQ(valve.Step(1, kClosed), TubeFlow::kAspirates);
   EXPECT_EQ(valve.Step(2, kBetween), TubeFlow::kAspirates);
   EXPECT_EQ(valve.Step(3, kOpen), TubeFlow::kNone);
@@ -47,10 +51,29 @@ TEST(TrumpetValve, BetweenTheTwoAnglesNothingChanges) {
 
 TEST(TrumpetValve, AHandleThatIsGoneOrUnreadableShutsNothingOpen) {
   TrumpetValve valve;
-  (void)valve.Step(1, kClosed);
+  (void)valve.Step(0, kOpen);
+  EXPECT_EQ(valve.Step(1, kClosed), TubeFlow::kAspirates);
   valve.Shut();
   EXPECT_EQ(valve.flow(), TubeFlow::kNone);
   EXPECT_EQ(valve.Step(5, std::numeric_limits<float>::quiet_NaN()), TubeFlow::kNone);
+}
+
+TEST(TrumpetValve, StartedDuringASqueezeItOpensWithTheNextOne) {
+  TrumpetValve valve;
+  EXPECT_EQ(valve.Step(1, kClosed), TubeFlow::kNone) << "the squeeze may have been one that irrigates";
+  EXPECT_EQ(valve.Step(2, kClosed), TubeFlow::kNone);
+  EXPECT_EQ(valve.Step(3, kOpen), TubeFlow::kNone);
+  EXPECT_EQ(valve.Step(4, kClosed), TubeFlow::kAspirates);
+}
+
+TEST(TrumpetValve, ASqueezeAspiratesWhereTheClockHasGoneBack) {
+  TrumpetValve valve;
+  (void)valve.Step(99, kOpen);
+  (void)valve.Step(100, kClosed);
+  (void)valve.Step(101, kOpen);
+  EXPECT_EQ(valve.Step(7, kClosed), TubeFlow::kAspirates);
+  (void)valve.Step(7.2, kOpen);
+  EXPECT_EQ(valve.Step(7.4, kClosed), TubeFlow::kIrrigates);
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 #include "render_node/geometry/sheet_rim.h"
 #include "services/scene/builder/build.h"
 
@@ -131,6 +133,45 @@ TEST_F(BleedingTest, HeatSealsIt) {
   EXPECT_FALSE(bleeding.AgesAt(t + 10)) << "and clots";
   EXPECT_FALSE(bleeding.Update(t + 0.2, membrane_, {}, &atlas_));
   EXPECT_EQ(Stained(), stained) << "the stains remain";
+}
+
+TEST_F(BleedingTest, AtRestItAgesEachTwoSecondsIfUpdatedOnlyForThat) {
+  Bleeding bleeding(view_, vessels_, 1, 16);
+  bleeding.Cut(place_, atlas_, 1.0);
+  bleeding.Update(2.0, membrane_, {}, &atlas_);
+  Heat(200);
+  double t = 2.0;
+  for (; t < 2.05 || (bleeding.moves() && t < 300); t += 0.05) bleeding.Update(t, membrane_, {}, &atlas_);
+  ASSERT_FALSE(bleeding.moves());
+  ASSERT_GT(bleeding.fluid().blood().liquid, 0);
+  std::vector<double> aged_s;
+  double clotted = bleeding.fluid().blood().clotted;
+  for (const double end = t + 21; t < end; t += 0.05) {
+    if (!bleeding.AgesAt(t)) continue;
+    bleeding.Update(t, membrane_, {}, &atlas_);
+    EXPECT_GT(bleeding.fluid().blood().clotted, clotted) << "an update without ageing";
+    clotted = bleeding.fluid().blood().clotted;
+    aged_s.push_back(t);
+  }
+  ASSERT_GE(aged_s.size(), 10u);
+  for (std::size_t k = 1; k < aged_s.size(); ++k) EXPECT_NEAR(aged_s[k] - aged_s[k - 1], 2, 0.08) << k;
+}
+
+TEST_F(BleedingTest, ASourceBleedsFromItsCutOnOnly) {
+  Bleeding bleeding(view_, vessels_, 1, 16);
+  bleeding.Cut(place_, atlas_, 1.0);
+  bleeding.Update(1.5, membrane_, {}, &atlas_);
+  Heat(200);
+  bleeding.Update(1.6, membrane_, {}, &atlas_);
+  ASSERT_EQ(bleeding.sources(), 0);
+  // What lies there is not moved on for 2 s; then another vessel is cut, 1.8 s of which have passed before.
+  const double before = bleeding.shed_m3();
+  bleeding.Cut(view_.membrane_material[view_.membrane.rows / 2 * view_.membrane.cols + 3 * view_.membrane.cols / 4],
+               atlas_, 3.4);
+  ASSERT_EQ(bleeding.sources(), 1);
+  bleeding.Update(3.6, membrane_, {}, &atlas_);
+  EXPECT_GT(bleeding.shed_m3() - before, 0.2 * 20e-9) << "with the first pulse";
+  EXPECT_LT(bleeding.shed_m3() - before, 0.3 * 20e-9);
 }
 
 TEST_F(BleedingTest, AVesselThatIsCutFurtherBleedsAtTheNewRim) {

@@ -195,6 +195,61 @@ TEST(TemporalFilter, LeavesNoGhostOfWhatMoves) {
   EXPECT_LT(error, single / 3);
 }
 
+double Flat(double, double) { return 40; }
+/// A bright square of 10 pixels from `left` on, over the flat one.
+Scene Square(double left) {
+  return [left](double x, double y) { return x > left && x < left + 10 && y > 20 && y < 30 ? 250.0 : 40.0; };
+}
+/// Pixels that show neither the flat picture nor the square from `left` on, but for its rim, over which a pixel of the
+/// picture is interpolated.
+int Ghosts(const std::vector<std::uint32_t>& shown, double left) {
+  constexpr double kRim = 3;  // [pixels]
+  int ghosts = 0;
+  for (int k = 0; k < kWidth * kHeight; ++k) {
+    const double x = k % kWidth + 0.5, y = k / kWidth + 0.5;
+    // How far inside the square.
+    const double inside = std::min({x - left, left + 10 - x, y - 20, 30 - y});
+    if (std::abs(inside) < kRim) continue;
+    const int wanted = inside > 0 ? 250 : 40;
+    ghosts += std::abs(Red(shown[static_cast<std::size_t>(k)]) - wanted) > 1 ? 1 : 0;
+  }
+  return ghosts;
+}
+constexpr double kNowhere = -1000;
+
+TEST(TemporalFilter, LeavesNoGhostOfWhatIsThereInOnePictureOnly) {
+  for (const double scale : {1.0, 0.72}) {
+    for (const int first : {0, 3, 5, 200}) {  // In the first period as well.
+      Camera camera(scale);
+      for (int k = 0; k < first; ++k) camera.Draw(Flat);
+      camera.Draw(Square(40));
+      EXPECT_EQ(Ghosts(camera.shown(), 40), 0) << scale << ' ' << first;
+      for (int k = 0; k < 3 * camera.filter().period(); ++k) {
+        camera.Draw(Flat);
+        ASSERT_EQ(Ghosts(camera.shown(), kNowhere), 0) << scale << ' ' << first << ' ' << k;
+      }
+    }
+  }
+}
+
+TEST(TemporalFilter, LeavesNoGhostOfWhatMovesFast) {
+  for (const double scale : {1.0, 0.72}) {
+    for (const double speed : {7.0, 20.0}) {  // Less and more than the square in a picture.
+      Camera camera(scale);
+      camera.DrawPeriods(2, Flat);
+      double left = -15;
+      for (; left < kWidth; left += speed) {
+        camera.Draw(Square(left));
+        ASSERT_EQ(Ghosts(camera.shown(), left), 0) << scale << ' ' << speed << ' ' << left;
+      }
+      for (int k = 0; k < 3 * camera.filter().period(); ++k) {
+        camera.Draw(Flat);
+        ASSERT_EQ(Ghosts(camera.shown(), kNowhere), 0) << scale << ' ' << speed << ' ' << k;
+      }
+    }
+  }
+}
+
 TEST(TemporalFilter, ShowsThePictureAloneUntilThePeriodIsComplete) {
   Camera camera(1);
   camera.DrawPeriods(2, Strip);
