@@ -1,13 +1,10 @@
 // render_node: draws the picture of the laparoscope, into a window (--window) or off screen into PNG files.
-#include <cstdio>
-#include <exception>
-#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "render_node/node/drawing_threads.h"
 #include "render_node/node/render_node.h"
-#include "render_node/offscreen/egl_context.h"
+#include "render_node/offscreen/graphics_report.h"
 #include "services/base/runtime/realtime.h"
 #include "services/nodes/app/node_app.h"
 #include "services/nodes/app/spare.h"
@@ -45,10 +42,8 @@ ExitCode RunRender(app::NodeApp& app) {
   bool seen = false;
   const auto step = [&](const Tick& tick) {
     node.Step(tick);
-    if (!seen && node.pictures_drawn() > 0) {
-      seen = true;
-      app.PublishHealthNow();  // After a restart the session waits for this Health.
-    }
+    // After a restart the session waits for this Health.
+    if (node.pictures_drawn() > 0 && !std::exchange(seen, true)) app.PublishHealthNow();
     if (node.closed()) app.Finish(ExitCode::kDone, "the window was closed");
   };
   const ExitCode code = app.Run(timing, step, [&](Health* health) { node.FillHealth(health); });
@@ -56,24 +51,10 @@ ExitCode RunRender(app::NodeApp& app) {
   return code;
 }
 
-/// What would draw off screen in a session, for `fulcrum doctor`.
-ExitCode PrintGraphics() {
-  try {
-    std::puts(render::EglContext().description().c_str());
-    return ExitCode::kDone;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return ExitCode::kFailure;
-  }
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc == 2 && std::string_view(argv[1]) == "--graphics") return static_cast<int>(PrintGraphics());
-  return app::NodeMain(
-      argc, argv, NodeId::kRender,
-      "Draws what the laparoscope sees: off screen into PNG files, or --window. --graphics alone prints "
-      "what draws off screen.",
-      RunRender);
+  if (render::AsksForGraphics(argc, argv)) return static_cast<int>(render::PrintGraphics());
+  constexpr const char* kPurpose = "Draws what the laparoscope sees; --graphics alone prints what draws off screen.";
+  return app::NodeMain(argc, argv, NodeId::kRender, kPurpose, RunRender);
 }

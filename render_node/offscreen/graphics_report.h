@@ -1,0 +1,13 @@
+// What draws off screen on this machine, for `fulcrum doctor`.
+#pragma once
+
+#include "services/base/core/exit_code.h"
+
+namespace fulcrum::render {
+
+/// Whether a command line asks for it: --graphics and nothing else.
+[[nodiscard]] bool AsksForGraphics(int argc, char** argv);
+/// Prints the device that a session would draw with, or on stderr why there is none.
+ExitCode PrintGraphics();
+
+}  // namespace fulcrum::render
