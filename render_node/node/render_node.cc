@@ -39,6 +39,7 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
       shape_{0, 0, static_cast<int>(scene.render.width), static_cast<int>(scene.render.height)},
       outlet_(settings.frames, ports.pictures),
       quality_(settings.quality, static_cast<int>(scene.render.height), display_.is_gpu()),
+      smooths_(settings.quality == Quality::kHigh && display_.can_smooth()),
       operator_stamper_(runtime::MonotonicNs()),
       picture_stamper_(runtime::MonotonicNs()),
       camera_(scene.render),
@@ -371,7 +372,7 @@ void RenderNode::Draw(double session_time_s, bool write_png, ReadBack read) {
   view_.SetScale(quality_.scale());
   // A file has no pictures shortly before it, unless a window or a reader of Picture is there, whose pictures it is
   // one of; a GPU draws many samples a pixel.
-  view_.SetSmoothed((window_ || streams_ || read == ReadBack::kAlways) && display_.can_smooth() &&
+  view_.SetSmoothed(smooths_ && (window_ || streams_) &&
                     shape_.width * shape_.height <= LaparoscopeView::kMostSmoothed);
   view_.Update();
   const bool settles = view_.DrawsBackgroundAtRest();

@@ -59,8 +59,9 @@ class RenderNode {
   ~RenderNode();
 
   /// Reads the ports and draws if the picture will be used: in a window, or while the topic Picture has a reader, after
-  /// each change, and on a software rasteriser after the last one until edges are smooth (LaparoscopeView::Refine);
-  /// otherwise if a PNG is due and something has changed since the last one. Else nothing is computed.
+  /// each change, and with Quality::kHigh in software after the last one until edges are smooth
+  /// (LaparoscopeView::Refine); otherwise if a PNG is due and something has changed since the last one. Else nothing is
+  /// computed.
   void Step(const Tick& tick);
 
   /// Moves smoke and blood on to the time of the last Step, for steps that draw nothing: otherwise they make up at most
@@ -159,6 +160,7 @@ class RenderNode {
   PixelBox shape_;  ///< Of the picture.
   PictureOutlet outlet_;
   QualityControl quality_;
+  const bool smooths_;             // Pictures of a window and of live readers, while the scope rests.
   bus::Stamper operator_stamper_;  ///< Of the thread of hands_.
   std::unique_ptr<WindowInput> hands_;
   bus::Stamper picture_stamper_;

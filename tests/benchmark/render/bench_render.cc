@@ -122,7 +122,6 @@ void FullScene(const SceneView& scene, StereoLayout layout, std::uint32_t width,
   QualityControl quality(Quality::kAuto, static_cast<int>(view.render.height), display->is_gpu());
   laparoscope.SetMostScale(quality.most());
   // As the node does for a window and live pictures.
-  laparoscope.SetSmoothed(display->can_smooth() && static_cast<int>(width * height) <= LaparoscopeView::kMostSmoothed);
   std::vector<float> xyz;
   std::vector<double> frame_ms, cpu_side_ms;
   const int repeats = report->quick() ? 20 : 100, settling = 200;
