@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <string>
+#include <vector>
 
 namespace fulcrum::render {
 namespace {
@@ -40,6 +41,21 @@ TEST(Hud, SaysWhatATubeDoesAndHow) {
   EXPECT_FALSE(Says(state, "TUBE: HOLD THE JAW: SUCTION"));
   state.tube = true;
   EXPECT_TRUE(Says(state, "TUBE: HOLD THE JAW: SUCTION"));
+}
+
+TEST(Hud, TheBarIsFullAtTheHighestForceAllowedAndAWarningAbove) {
+  HudState state;
+  state.force_limit_N = 4;
+  state.force_N[0] = 4.0f;
+  state.force_N[1] = 7.66f;
+  const std::vector<OverlayText> texts = HudTexts(state, true);
+  const auto bar = [&](const std::string& text) {
+    return std::find_if(texts.begin(), texts.end(), [&](const OverlayText& t) { return t.text == text; });
+  };
+  ASSERT_NE(bar("L ▮▮▮▮▮▮▮▮▮▮ 4.0 N"), texts.end());
+  EXPECT_FALSE(bar("L ▮▮▮▮▮▮▮▮▮▮ 4.0 N")->warning);
+  ASSERT_NE(bar("R ▮▮▮▮▮▮▮▮▮▮ 7.7 N"), texts.end());
+  EXPECT_TRUE(bar("R ▮▮▮▮▮▮▮▮▮▮ 7.7 N")->warning);
 }
 
 }  // namespace
