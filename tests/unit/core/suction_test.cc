@@ -10,6 +10,15 @@ namespace {
 
 constexpr float kOpen = 0.7f, kClosed = 0;
 
+/// An open handle, squeezed from `begin_s` to `end_s`.
+TrumpetValve SqueezedOnce(double begin_s, double end_s) {
+  TrumpetValve valve;
+  (void)valve.Step(begin_s - 0.5, kOpen);
+  (void)valve.Step(begin_s, kClosed);
+  (void)valve.Step(end_s, kOpen);
+  return valve;
+}
+
 TEST(TrumpetValve, ASqueezeAspiratesWhileItLasts) {
   TrumpetValve valve;
   EXPECT_EQ(valve.Step(0, kOpen), TubeFlow::kNone);
@@ -19,10 +28,7 @@ TEST(TrumpetValve, ASqueezeAspiratesWhileItLasts) {
 }
 
 TEST(TrumpetValve, ASecondSqueezeSoonAfterIrrigates) {
-  TrumpetValve valve;
-  (void)valve.Step(0.5, kOpen);
-  (void)valve.Step(1.0, kClosed);
-  (void)valve.Step(1.2, kOpen);
+  TrumpetValve valve = SqueezedOnce(1.0, 1.2);
   EXPECT_EQ(valve.Step(1.4, kClosed), TubeFlow::kIrrigates);
   EXPECT_EQ(valve.Step(5.0, kClosed), TubeFlow::kIrrigates);
   EXPECT_EQ(valve.Step(5.1, kOpen), TubeFlow::kNone);
@@ -30,10 +36,7 @@ TEST(TrumpetValve, ASecondSqueezeSoonAfterIrrigates) {
 }
 
 TEST(TrumpetValve, ALateSecondSqueezeAspirates) {
-  TrumpetValve valve;
-  (void)valve.Step(0.5, kOpen);
-  (void)valve.Step(1.0, kClosed);
-  (void)valve.Step(1.2, kOpen);
+  TrumpetValve valve = SqueezedOnce(1.0, 1.2);
   EXPECT_EQ(valve.Step(1.0 + TrumpetValve::kTwice_s, kClosed), TubeFlow::kAspirates);
 }
 
@@ -67,10 +70,7 @@ TEST(TrumpetValve, StartedDuringASqueezeItOpensWithTheNextOne) {
 }
 
 TEST(TrumpetValve, ASqueezeAspiratesWhereTheClockHasGoneBack) {
-  TrumpetValve valve;
-  (void)valve.Step(99, kOpen);
-  (void)valve.Step(100, kClosed);
-  (void)valve.Step(101, kOpen);
+  TrumpetValve valve = SqueezedOnce(100, 101);
   EXPECT_EQ(valve.Step(7, kClosed), TubeFlow::kAspirates);
   (void)valve.Step(7.2, kOpen);
   EXPECT_EQ(valve.Step(7.4, kClosed), TubeFlow::kIrrigates);

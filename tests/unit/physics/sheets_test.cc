@@ -10,6 +10,7 @@
 #include "physics_node/simulation/tissue_simulation.h"
 #include "physics_node/tear/tear_watch.h"
 #include "services/scene/builder/build.h"
+#include "tests/support/flat_sheets.h"
 #include "tests/support/several_solids.h"
 #include "tests/support/whole_topology.h"
 
@@ -18,43 +19,21 @@ namespace {
 
 /// A flat sheet of `rows` x `cols` nodes, h apart, from `corner` along +x and +y.
 scene::SheetBody Flat(const char* name, int rows, int cols, double h, const Vec3d& corner) {
-  scene::SheetBody sheet;
-  sheet.name = name;
-  sheet.grid.rows = rows;
-  sheet.grid.cols = cols;
-  sheet.grid.bending_row_stride = sheet.grid.bending_col_stride = 1;
-  for (int r = 0; r < rows; ++r) {
-    for (int c = 0; c < cols; ++c) sheet.nodes.push_back(corner + Vec3d(h * c, h * r, 0));
-  }
-  return sheet;
+  return FlatSheet(name, rows, cols, corner, Vec3d(0, h, 0), Vec3d(h, 0, 0));
 }
-
-scene::SceneSettings SettingsOf(PhysicsMode mode) {
-  scene::SceneSettings settings = scene::Small();
-  settings.name = "sheets";
-  settings.has_organ = false;
-  settings.structures.clear();
-  settings.script.clear();
-  settings.planned_line.clear();
-  settings.physics.mode = mode;
-  settings.physics.gravity = Vec3f::Zero();
-  return settings;
-}
-
-constexpr double kCell = 0.0015;
 
 /// A sheet of 30 x 22 nodes about the origin and, if there are `others`, a narrower one beside it and a band of one
 /// cell above both.
 scene::SceneData Sheets(PhysicsMode mode, bool others) {
   scene::Anatomy anatomy;
-  anatomy.sheets.push_back(Flat("first", 30, 22, kCell, Vec3d(-0.016, -0.022, 0)));
+  anatomy.sheets.push_back(Flat("first", 30, 22, kFlatCell_m, Vec3d(-0.016, -0.022, 0)));
   if (others) {
-    anatomy.sheets.push_back(Flat("second", 27, 14, kCell, Vec3d(0.05, -0.02, 0)));
+    anatomy.sheets.push_back(Flat("second", 27, 14, kFlatCell_m, Vec3d(0.05, -0.02, 0)));
     anatomy.sheets.back().sides_held = false;
-    anatomy.sheets.push_back(Flat("band", 25, 2, kCell, Vec3d(0.02, -0.02, 0.06)));
+    anatomy.sheets.push_back(Flat("band", 25, 2, kFlatCell_m, Vec3d(0.02, -0.02, 0.06)));
     anatomy.sheets.back().sides_held = false;
   }
-  return scene::AssembleScene(SettingsOf(mode), anatomy);
+  return scene::AssembleScene(SheetSettings(mode), anatomy);
 }
 
 Vec3f At(const TissueSimulation& simulation, Index particle) {
@@ -230,7 +209,7 @@ TEST(SheetsOfOneGrid, HaveBindingsOfTheirOwn) {
       anatomy.sheets.push_back(Flat("fine", 21, 17, 0.0005, Vec3d(-0.004, -0.004, 0.016)));
       anatomy.sheets.back().over = 0;
     }
-    return scene::AssembleScene(SettingsOf(PhysicsMode::kAccurate), anatomy);
+    return scene::AssembleScene(SheetSettings(PhysicsMode::kAccurate), anatomy);
   };
   const scene::SceneData alone = build(false), both = build(true);
   const std::vector<double> one = BindingStiffness(alone.View()), two = BindingStiffness(both.View());
@@ -254,11 +233,11 @@ class Strip : public testing::TestWithParam<int> {};
 TEST_P(Strip, SagsAsAString) {
   constexpr double kG = 3.2, kWeight_Pa = 0.5 * kG, kEt = 20, kLength_m = 40 * 0.002;
   scene::Anatomy anatomy;
-  anatomy.sheets.push_back(Flat("wide", 20, 22, kCell, Vec3d(0.05, 0, 0)));
+  anatomy.sheets.push_back(Flat("wide", 20, 22, kFlatCell_m, Vec3d(0.05, 0, 0)));
   anatomy.sheets.push_back(Flat("strip", 41, GetParam(), 0.002, Vec3d::Zero()));
   anatomy.sheets.back().sides_held = false;
   anatomy.sheets.back().grid.density_kg_m2 = 0.5;
-  scene::SceneSettings settings = SettingsOf(PhysicsMode::kAccurate);
+  scene::SceneSettings settings = SheetSettings(PhysicsMode::kAccurate);
   settings.physics.gravity = Vec3f(0, 0, -static_cast<float>(kG));
   settings.physics.membrane_Et_N_per_m = kEt;
   settings.physics.membrane_stiffening = settings.physics.membrane_prestrain = 0;
@@ -296,7 +275,7 @@ scene::SceneData TwoStrips(const scene::SceneSettings& settings, bool with_pad) 
 }
 
 TEST(SheetsOfTheirOwn, HaveTheStiffnessThatASceneOfThatAloneWouldHave) {
-  scene::SceneSettings settings = SettingsOf(PhysicsMode::kAccurate), as_second = settings;
+  scene::SceneSettings settings = SheetSettings(PhysicsMode::kAccurate), as_second = settings;
   as_second.physics.membrane_Et_N_per_m = kOwn.Et_N_per_m;
   as_second.physics.membrane_bending_Nm = kOwn.bending_Nm;
   as_second.physics.fat_youngs_modulus_Pa = kOwn.fat_youngs_modulus_Pa;
@@ -332,7 +311,7 @@ TEST(SheetsOfTheirOwn, HaveTheStiffnessThatASceneOfThatAloneWouldHave) {
 /// The other modes estimate forces from the edges, and the servo's skin is that of the sheet, in all of them.
 TEST(SheetsOfTheirOwn, AreFeltAsTheirOwn) {
   for (const PhysicsMode mode : {PhysicsMode::kXpbd, PhysicsMode::kAccurate}) {
-    scene::SceneSettings settings = SettingsOf(mode);
+    scene::SceneSettings settings = SheetSettings(mode);
     settings.physics.membrane_Et_N_per_m = 150;
     const scene::SceneData data = TwoStrips(settings, false);
     DeviceContacts felt[2];
@@ -357,7 +336,7 @@ TEST(SheetsOfTheirOwn, AreFeltAsTheirOwn) {
 /// the share s.
 TEST(SheetsOfTheirOwn, SagAsStringsOfTheirOwnStiffness) {
   constexpr double kG = 3.2, kWeight_Pa = 0.5 * kG, kLength_m = 40 * 0.002, kShare = 0.99;
-  scene::SceneSettings settings = SettingsOf(PhysicsMode::kAccurate);
+  scene::SceneSettings settings = SheetSettings(PhysicsMode::kAccurate);
   settings.physics.gravity = Vec3f(0, 0, -static_cast<float>(kG));
   settings.physics.membrane_stiffening = settings.physics.membrane_prestrain = 0;
   settings.physics.membrane_bending_Nm = 1e-9f;
@@ -394,7 +373,7 @@ TEST(SheetsOfTheirOwn, SagAsStringsOfTheirOwnStiffness) {
 
 TEST(SheetsOfTheirOwn, TearAtTheirOwnStretch) {
   for (const float of_scene : {3.1f, 0.0f}) {
-    scene::SceneSettings settings = SettingsOf(PhysicsMode::kAccurate);
+    scene::SceneSettings settings = SheetSettings(PhysicsMode::kAccurate);
     settings.physics.tear_stretch = of_scene;
     settings.physics.membrane_prestrain = 0;
     const scene::SceneData data = TwoStrips(settings, false);
@@ -431,7 +410,7 @@ TEST(WithoutASheet, SolidsArePressedAndGrasped) {
     scene::Anatomy anatomy;
     anatomy.solids.push_back(Box("pad", {-0.02, -0.02, 0}, {0.04, 0.04, 0.015}, {8, 8, 3}, 2e4));
     Fix(&anatomy.solids[0], [](const Vec3d& p) { return p.z() < 1e-6; });
-    const scene::SceneData data = scene::AssembleScene(SettingsOf(mode), anatomy);
+    const scene::SceneData data = scene::AssembleScene(SheetSettings(mode), anatomy);
     const SceneView scene = data.View();
     ASSERT_EQ(scene.membrane.node_count(), 0u);
     TissueSimulation simulation(scene);
