@@ -283,6 +283,7 @@ void SheetPatches::FindFolds(Index patch) {
 }
 
 void SheetPatches::Restart() {
+  if (sheets_.size() < 2 && !within_) return;  // No pair is possible.
   std::fill(step_.begin(), step_.end(), 0.0f);
   std::fill(room_.begin(), room_.end(), kLargestFinite);
   pair_count_ = 0;
@@ -301,6 +302,7 @@ void SheetPatches::Restart() {
 }
 
 void SheetPatches::Follow(std::span<const Index> edited_edges) {
+  if (sheets_.size() < 2 && !within_) return;
   edited_.assign(patches_.size(), 0);
   const auto mark = [&](std::uint32_t row, std::uint32_t col) {
     const std::size_t sheet = sheet_of_row_[row];
