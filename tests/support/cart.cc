@@ -12,6 +12,9 @@
 #include <system_error>
 #include <thread>
 
+#include "services/base/core/exit_code.h"
+#include "tests/support/pace_faults.h"
+
 namespace fulcrum::testing {
 
 namespace fs = std::filesystem;
@@ -102,6 +105,17 @@ std::optional<int> Cart::WaitForEnd(double limit_s) {
   std::optional<int> code;
   WaitFor(limit_s, [&] { return (code = up_.Poll()).has_value(); });
   return code;
+}
+
+std::string Cart::FaultAtEnd(double limit_s) {
+  const std::optional<int> code = WaitForEnd(limit_s);
+  const std::string said = Said();
+  if (!code) return "it does not end\n" + said;
+  if (*code == 0) return {};
+  const std::string faults = FaultsButPace(said);
+  const bool slow =
+      *code == static_cast<int>(ExitCode::kFailure) && faults.empty() && said.find("\nfault at ") != std::string::npos;
+  return slow ? std::string() : "exit code " + std::to_string(*code) + "\n" + faults + said;
 }
 
 }  // namespace fulcrum::testing

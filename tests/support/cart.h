@@ -49,6 +49,9 @@ class Cart {
   void Signal(int signal) const { up_.Signal(signal); }
   /// Exit code of `fulcrum up`, or minus the signal; no value if it does not end within the limit.
   [[nodiscard]] std::optional<int> WaitForEnd(double limit_s);
+  /// Waits for the end. Empty: `fulcrum up` ended by itself and found no fault but, at most, nodes that this machine is
+  /// too slow for. Otherwise the faults and all that it printed.
+  [[nodiscard]] std::string FaultAtEnd(double limit_s);
 
  private:
   std::filesystem::path folder_;

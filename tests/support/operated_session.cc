@@ -35,7 +35,7 @@ class Window final : public OperatedSession {
   [[nodiscard]] MouseAndKeyboard& hand() override { return *client_; }
   [[nodiscard]] bool End() override {
     cart_->Signal(SIGINT);
-    return cart_->WaitForEnd(kPatience_s) == 0;
+    return cart_->FaultAtEnd(kPatience_s).empty();
   }
   [[nodiscard]] std::string Said() const override { return cart_ ? cart_->Said() : "no X server"; }
 

@@ -21,7 +21,7 @@ class OperatedSession {
   [[nodiscard]] virtual MouseAndKeyboard& hand() = 0;
   [[nodiscard]] Eyes& eyes() { return *eyes_; }
   [[nodiscard]] const SceneView& scene() const { return scene_->view(); }
-  /// Ends the session. True: all was well.
+  /// Ends the session. True: all was well; in a window also if nodes ran too slowly for their periods.
   [[nodiscard]] virtual bool End() = 0;
   [[nodiscard]] virtual std::string Said() const = 0;
 

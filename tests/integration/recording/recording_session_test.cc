@@ -30,7 +30,7 @@ TEST(RecordedCart, EveryTopicIsInTheFileAndDecodes) {
   ASSERT_TRUE(testing::WaitFor(60, [&] { return cart.Said().find(" s · ") != std::string::npos; })) << cart.Said();
   // A command and its reply: this session has no recorder for dumps, so the dump is refused.
   EXPECT_EQ(Program("fulcrum", {"dump", "--domain", std::to_string(kCartDomain)}).End(0), 1);
-  EXPECT_EQ(cart.WaitForEnd(60), 0) << cart.Said();
+  EXPECT_EQ(cart.FaultAtEnd(60), "");
   EXPECT_NE(cart.Said().find("recording.mcap"), std::string::npos) << "the report names it\n" << cart.Said();
   const fs::path file = cart.session() / "recording.mcap";
 
@@ -175,7 +175,7 @@ TEST(RecordedCart, TheNextSessionNeedNotWaitForTheVideo) {
   EXPECT_EQ(Program("fulcrum", {"status", "--domain", std::to_string(kCartDomain)}).End(0), 0);
   EXPECT_TRUE(fs::exists(bus::SharedMemoryDirectory(kCartDomain))) << "of the next one";
   next.Signal(SIGINT);
-  EXPECT_EQ(next.WaitForEnd(60), 0) << next.Said();
+  EXPECT_EQ(next.FaultAtEnd(60), "");
   EXPECT_TRUE(fs::exists(session.video()));
 }
 

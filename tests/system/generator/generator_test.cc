@@ -79,7 +79,7 @@ TEST(GeneratorOfTheCart, IsTurnedDuringACutAndTheReplayComesToTheSameStates) {
     })) << cart.Said();
     std::this_thread::sleep_for(std::chrono::seconds(1));
     cart.Signal(SIGINT);
-    ASSERT_EQ(cart.WaitForEnd(kPatience_s), 0) << cart.Said();
+    ASSERT_EQ(cart.FaultAtEnd(kPatience_s), "");
 
     const fs::path recording = cart.session() / "recording.mcap";
     const auto run = testing::Replay(recording, {"--into", "physics", "thermal"}, 60);

@@ -9,6 +9,7 @@
 #include "services/base/core/tick.h"
 #include "services/session/supervisor/node_pulse.h"
 #include "services/session/supervisor/script_outlook.h"
+#include "tests/support/pace_faults.h"
 
 namespace fulcrum::supervisor {
 namespace {
@@ -146,6 +147,22 @@ TEST_F(VerdictTest, MissedPeriodsOfTheWholeSession) {
   RunFor(12);
   EXPECT_EQ(Faults(), "");
   EXPECT_EQ(End(), "haptics_node missed 20 % of its periods; at most 15 % are allowed\n");
+}
+
+// Tests of behaviour accept sessions of machines that are too slow, and nothing else.
+TEST_F(VerdictTest, FaultsOfPaceAreToldFromOthers) {
+  const auto said = [&] {
+    std::string text = "60 s: NOT WELL\n";
+    for (const Fault& fault : verdict_.faults()) text += "fault at 5.0 s: " + fault.text + "\n";
+    return text;
+  };
+  servo_.achieved_Hz = 600;
+  RunFor(20);
+  End();
+  EXPECT_EQ(verdict_.faults().size(), 2u) << Faults();
+  EXPECT_EQ(testing::FaultsButPace(said()), "");
+  verdict_.Fail(5, ExitCode::kFailure, "the recorder lost samples");
+  EXPECT_EQ(testing::FaultsButPace(said()), "fault at 5.0 s: the recorder lost samples\n");
 }
 
 TEST_F(VerdictTest, AMomentOfLoadIsNoFault) {
