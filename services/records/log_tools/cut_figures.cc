@@ -65,7 +65,7 @@ void MeasureWay(CutMap* map) {
     const Vec2d from = goes_on ? map->ToTexel(last->centre) : to;
     const double length = (to - from).norm();
     const double speed_m_s = goes_on ? length * map->recorded.texels.texel_m / (frame.time_s - last->time_s) : 0;
-    const bool cuts = speed_m_s * map->recorded.vaporising_J_m <= static_cast<double>(frame.power_W);
+    const bool cuts = speed_m_s * frame.vaporising_J_m <= static_cast<double>(frame.power_W);
     for (; next <= length; next += step) {
       const Vec2d at = length > 0 ? Vec2d(from + next / length * (to - from)) : to;
       const bool open = IsOpen(*map, at);

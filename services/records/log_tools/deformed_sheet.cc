@@ -199,9 +199,12 @@ void DeformedSheet::FillDeadNodes() {
 
 std::optional<DeformedSheet::Place> DeformedSheet::Nearest(const Vec3f& p_W, float within_m) const {
   std::optional<Place> nearest;
-  for (const SheetPart& sheet : SheetsOf(scene_)) {
-    const std::optional<Place> place = NearestOn(sheet, p_W, within_m);
-    if (place && (!nearest || place->distance_m < nearest->distance_m)) nearest = place;
+  const std::vector<SheetPart> sheets = SheetsOf(scene_);
+  for (std::size_t sheet = 0; sheet < sheets.size(); ++sheet) {
+    std::optional<Place> place = NearestOn(sheets[sheet], p_W, within_m);
+    if (!place || (nearest && place->distance_m >= nearest->distance_m)) continue;
+    place->sheet = sheet;
+    nearest = place;
   }
   return nearest;
 }

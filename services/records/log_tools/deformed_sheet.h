@@ -31,6 +31,7 @@ class DeformedSheet {
   struct Place {
     float distance_m = 0;
     Vec2f material = Vec2f::Zero();  ///< (s, t) [m].
+    std::size_t sheet = 0;           ///< Which of SheetsOf(scene).
   };
   /// The nearest place; empty if the whole sheet is farther away than `within_m`.
   [[nodiscard]] std::optional<Place> Nearest(const Vec3f& p_W, float within_m) const;

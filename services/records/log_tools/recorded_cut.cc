@@ -10,6 +10,7 @@
 
 #include "services/base/core/error.h"
 #include "services/base/core/generator_inputs.h"
+#include "services/base/core/sheet_heat.h"
 #include "services/records/log_tools/deformed_sheet.h"
 #include "services/records/log_tools/recording.h"
 #include "services/records/recording/recorded_scene.h"
@@ -96,13 +97,15 @@ class Reader {
     const ToolDescription& tool = scene.tools[tool_];
     axis_ = MetalAxis(tool);
     const float margin_m = scene.physics.collision_margin_m;
-    const float touch_m =
-        tool.tip_radius_m +
-        (reach.with_collision_margin ? margin_m : std::min(margin_m, 0.5f * scene.thermal.thickness_m));
-    strikes_m_ = touch_m + reach.strikes_m;
-    limit_m_ = touch_m + reach.holds_m;
+    reach_ = reach;
+    for (const SheetPart& sheet : SheetsOf(scene)) {
+      const ThermalParams thermal = ThermalOf(sheet, scene.thermal);
+      const float skin_m = reach.with_collision_margin ? margin_m : std::min(margin_m, 0.5f * thermal.thickness_m);
+      touch_m_.push_back(tool.tip_radius_m + skin_m);
+      vaporising_J_m_.push_back(VaporisingHeat_J_m(thermal, 2 * tool.tip_radius_m));
+    }
+    limit_m_ = *std::max_element(touch_m_.begin(), touch_m_.end()) + reach.holds_m;
     cut_.texels = TexelsOf(scene);
-    cut_.vaporising_J_m = VaporisingHeat_J_m(scene.thermal, 2 * tool.tip_radius_m);
   }
 
   void Begin(const SceneManifest& session) {
@@ -240,21 +243,26 @@ class Reader {
     metal.nearest_m = std::numeric_limits<float>::infinity();
     std::vector<Contact> contacts;
     bool follows = false;  // The previous sample along the metal touches too.
+    bool strikes = false;
     for (const Vec3f& p_T : axis_) {
       const auto place = sheet_.Nearest(pose.p_WT + pose.q_WT * p_T, limit_m_);
-      if (!place) {
+      const float gap_m = place ? place->distance_m - touch_m_[place->sheet] : std::numeric_limits<float>::infinity();
+      if (!(gap_m <= reach_.holds_m)) {
         follows = false;
         continue;
       }
-      if (!follows || (place->material - metal.touched.back()).norm() > kSameContact_m) contacts.emplace_back();
+      if (!follows || (place->material - metal.touched.back()).norm() > kSameContact_m) {
+        contacts.push_back({.vaporising_J_m = vaporising_J_m_[place->sheet]});
+      }
       follows = true;
       metal.touched.push_back(place->material);
       metal.nearest_m = std::min(metal.nearest_m, place->distance_m);
-      contacts.back().sum += (limit_m_ - place->distance_m) * place->material;
-      contacts.back().weight += limit_m_ - place->distance_m;
+      strikes = strikes || gap_m < reach_.strikes_m;
+      contacts.back().sum += (reach_.holds_m - gap_m) * place->material;
+      contacts.back().weight += reach_.holds_m - gap_m;
     }
     const bool holds = !cut_.metal.empty() && cut_.metal.back().in_contact;
-    if (metal.nearest_m < strikes_m_ || holds) {
+    if (strikes || holds) {
       ChooseContact(contacts, &metal);
     } else {
       metal.touched.clear();
@@ -266,6 +274,7 @@ class Reader {
   struct Contact {
     Vec2f sum = Vec2f::Zero();
     float weight = 0;
+    double vaporising_J_m = 0;
     [[nodiscard]] Vec2f centre() const { return sum / weight; }
   };
   void ChooseContact(const std::vector<Contact>& contacts, MetalFrame* metal) const {
@@ -274,6 +283,7 @@ class Reader {
     if (strongest == contacts.end() || !(strongest->weight > 0)) return;
     metal->in_contact = true;
     metal->centre = strongest->centre();
+    metal->vaporising_J_m = strongest->vaporising_J_m;
     const MetalFrame* last = cut_.metal.empty() ? nullptr : &cut_.metal.back();
     if (last == nullptr || !last->in_contact) return;
     float nearest = kContactStep_m;
@@ -282,13 +292,18 @@ class Reader {
       if (distance > nearest || contact.weight < kStillTouches * strongest->weight) continue;
       nearest = distance;
       metal->centre = contact.centre();
+      metal->vaporising_J_m = contact.vaporising_J_m;
       metal->goes_on = true;
     }
   }
 
   std::size_t tool_ = 0;
   std::vector<Vec3f> axis_;
-  float strikes_m_ = 0, limit_m_ = 0;  ///< Distances of the axis from the middle of the sheet.
+  ContactReach reach_;
+  /// By sheet: distance of the axis from its middle where the metal touches it [m]; what VaporisingHeat_J_m gives.
+  std::vector<float> touch_m_;
+  std::vector<double> vaporising_J_m_;
+  float limit_m_ = 0;  ///< No metal farther than this from any sheet touches one [m].
   std::int64_t start_ns_ = 0;
   DeformedSheet sheet_;
   std::vector<std::uint8_t> dead_nodes_, dead_edges_;

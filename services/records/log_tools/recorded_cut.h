@@ -50,6 +50,9 @@ struct MetalFrame {
   float nearest_m = 0;                   ///< Smallest distance of the metal's axis from the sheet.
   CauteryMode mode = CauteryMode::kOff;  ///< Mode of the pedals; off without power.
   float power_W = 0;                     ///< Set power of that mode.
+  /// Heat that warms and vaporises a strip of the metal's width of the sheet of `centre`, per length [J/m]: power
+  /// divided by this value is the highest speed at which that power can cut at this width.
+  double vaporising_J_m = 0;
 };
 
 /// One CauteryContact, with the mode and the set power at its time.
@@ -74,9 +77,6 @@ struct RecordedCut {
   std::vector<CurrentSample> current;
   std::vector<ReportedLength> lengths;
   TimingSummary thermal_step;  ///< Last value in the Health of thermal_node.
-  /// Heat that warms and vaporises a strip of the sheet of the metal's width, per length [J/m]: power divided by this
-  /// value is the highest speed at which that power can cut at this width.
-  double vaporising_J_m = 0;
   /// Time from the first energised touch to the first cut reported by thermal_node, or to the first patch with a
   /// removed texel if that is earlier [s]; NaN: no patch has one.
   double first_opening_s = 0;

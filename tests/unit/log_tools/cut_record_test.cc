@@ -181,6 +181,24 @@ TEST_F(CutRecording, TouchGoesByTheReach) {
   for (const MetalFrame& frame : far.metal) EXPECT_FALSE(frame.in_contact);
 }
 
+TEST_F(CutRecording, EachSheetHasItsOwnThickness) {
+  const ContactReach far{.with_collision_margin = false, .strikes_m = -0.4e-3f, .holds_m = -0.4e-3f};
+  const double of_scene_J_m = ReadCut(Record(), scene_.view).metal.front().vaporising_J_m;
+  EXPECT_GT(of_scene_J_m, 0);
+  std::vector<SheetPart> sheets = {{"thick", 0, FlatScene::kRows, FlatScene::kCols, 0}};
+  sheets[0].thickness_m = 3 * scene_.view.thermal.thickness_m;
+  scene_.view.physics.collision_margin_m = 1e-3f;
+  scene_.view.sheets = sheets;
+  const std::vector<float> rest_length(3 * scene_.places.size(), 1e-3f);
+  scene_.view.membrane_rest_length = rest_length;
+  const RecordedCut cut = ReadCut(Record(), scene_.view, far);
+  ASSERT_GT(cut.metal.size(), 90u);
+  for (const MetalFrame& frame : cut.metal) {
+    EXPECT_TRUE(frame.in_contact) << "half of its thickness is 0.3 mm more";
+    EXPECT_NEAR(frame.vaporising_J_m, 3 * of_scene_J_m, 1e-4 * of_scene_J_m);
+  }
+}
+
 TEST_F(CutRecording, LastPatchTellsTheHole) {
   const CutMap map = ReadCutMap(Record(), scene_.view);
   EXPECT_NEAR(map.figures.removed_mm2, 2.0, 1e-5);
