@@ -11,7 +11,6 @@
 namespace fulcrum::render {
 namespace {
 
-constexpr int kBlock = 16;
 constexpr std::uint8_t kDamaged = 20;  // Damage below this value (of 255) is not visible.
 // Half widths of a cut that is drawn from the topology: slit, charred, browned and blanched rim. Typical of an L-hook
 // at 30 W on peritoneum (0.2-0.5 mm lateral damage).
@@ -64,7 +63,7 @@ Atlas::Atlas(const SceneView& scene) : texel_m_(scene.membrane.texel_m) {
                0);
   blocks_x_ = (width_ + kBlock - 1) / kBlock;
   covered_.assign(static_cast<std::size_t>(blocks_x_) * ((height_ + kBlock - 1) / kBlock), 0);
-  touched_ = covered_;
+  touched_ = cut_ = covered_;
   painted_.assign(scene.membrane.triangle_count(), 0);
   const auto body = static_cast<std::uint8_t>(std::lround((scene.thermal.body_temperature_C - 20.0f) * 2));
   texels_.resize(4u * static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
@@ -86,16 +85,22 @@ AtlasRect Atlas::Apply(const TemperaturePatch& patch) {
   if (rect.empty()) {
     return {};
   }
+  bool restored = false;
   for (int row = 0; row < rect.height; ++row) {
     const std::uint8_t* after = patch.texels.data() + 4 * static_cast<std::size_t>(row) * kPatchTexels + 3;
     const std::uint8_t* before = texels_.data() + 4 * TexelIndex(x, y + row, width_) + 3;
     for (int column = 0; column < rect.width; ++column) {
-      if (after[4 * column] < 128 && before[4 * column] >= 128) MarkRim(x + column, y + row);
+      const bool removed = after[4 * column] < 128;
+      if (removed == (before[4 * column] < 128)) continue;
+      ++removals_;
+      if (removed) MarkRim(x + column, y + row);
+      restored = restored || !removed;
     }
     std::memcpy(texels_.data() + 4 * TexelIndex(x, y + row, width_),
                 patch.texels.data() + 4 * static_cast<std::size_t>(row) * kPatchTexels,
                 4 * static_cast<std::size_t>(rect.width));
   }
+  if (restored) MarkRimsAgain(rect);
   for (int by = y / kBlock; by <= (y + rect.height - 1) / kBlock; ++by) {
     for (int bx = x / kBlock; bx <= (x + rect.width - 1) / kBlock; ++bx) {
       covered_[TexelIndex(bx, by, blocks_x_)] = 1;
@@ -123,6 +128,20 @@ float Atlas::Blood(const Vec2f& material) const {
   return static_cast<float>(film_[kFilmBytes * TexelIndex(x, y, film_width_)]) / 255;
 }
 
+float Atlas::Nearness(const Vec2f& material) const {
+  const Vec2f place = (material / (kFilmCell * texel_m_)).array() - 0.5f;
+  const auto x = static_cast<int>(std::floor(place.x())), y = static_cast<int>(std::floor(place.y()));
+  const float right = place.x() - static_cast<float>(x), up = place.y() - static_cast<float>(y);
+  const auto cell = [&](int column, int row) {
+    const std::size_t at =
+        TexelIndex(std::clamp(column, 0, film_width_ - 1), std::clamp(row, 0, film_height_ - 1), film_width_);
+    return static_cast<float>(film_[kFilmBytes * at + 1]) / 255;
+  };
+  const float low = (1 - right) * cell(x, y) + right * cell(x + 1, y);
+  const float high = (1 - right) * cell(x, y + 1) + right * cell(x + 1, y + 1);
+  return (1 - up) * low + up * high;
+}
+
 /// Marks what lies beside the removed texel (x, y).
 void Atlas::MarkRim(int x, int y) {
   const float cell = kFilmCell * texel_m_;
@@ -137,6 +156,26 @@ void Atlas::MarkRim(int x, int y) {
     }
   }
   film_change_ = film_change_.United({x0, y0, x1 - x0 + 1, y1 - y0 + 1});
+}
+
+/// Marks the rims around `rect` from the texels as they are: a slit that was drawn from the topology lies beside the
+/// one of the patch.
+void Atlas::MarkRimsAgain(const AtlasRect& rect) {
+  const int reach = static_cast<int>(std::ceil(kRim_m / texel_m_)) + 2 * kFilmCell;
+  const int x0 = std::max(0, rect.x - reach), x1 = std::min(width_, rect.x + rect.width + reach);
+  const int y0 = std::max(0, rect.y - reach), y1 = std::min(height_, rect.y + rect.height + reach);
+  for (int v = y0 / kFilmCell; v <= (y1 - 1) / kFilmCell; ++v) {
+    for (int u = x0 / kFilmCell; u <= (x1 - 1) / kFilmCell; ++u) {
+      film_[kFilmBytes * TexelIndex(u, v, film_width_) + 1] = 0;
+    }
+  }
+  film_change_ = film_change_.United({x0 / kFilmCell, y0 / kFilmCell, (x1 - 1) / kFilmCell - x0 / kFilmCell + 1,
+                                      (y1 - 1) / kFilmCell - y0 / kFilmCell + 1});
+  for (int y = std::max(0, y0 - reach); y < std::min(height_, y1 + reach); ++y) {
+    for (int x = std::max(0, x0 - reach); x < std::min(width_, x1 + reach); ++x) {
+      if (texels_[4 * TexelIndex(x, y, width_) + 3] < 128) MarkRim(x, y);
+    }
+  }
 }
 
 std::optional<std::array<std::uint8_t, 4>> Atlas::At(const Vec2f& material) const {
@@ -164,10 +203,13 @@ bool Atlas::Removed(const Vec2f& material) const {
 }
 
 void Atlas::Touch(const AtlasRect& rect) {
+  ++patches_;
   for (int y = rect.y; y < rect.y + rect.height; ++y) {
     for (int x = rect.x; x < rect.x + rect.width; ++x) {
       const std::uint8_t* texel = texels_.data() + 4 * TexelIndex(x, y, width_);
-      std::uint8_t& touched = touched_[TexelIndex(x / kBlock, y / kBlock, blocks_x_)];
+      const std::size_t block = TexelIndex(x / kBlock, y / kBlock, blocks_x_);
+      std::uint8_t& touched = touched_[block];
+      if (texel[3] < 128) cut_[block] = 1;
       if (touched == 0 && (texel[1] >= kDamaged || texel[3] < 128)) {
         touched = 1;
         ++touches_;
@@ -235,6 +277,7 @@ AtlasRect Atlas::PaintCapsule(const Vec2f& a, const Vec2f& b) {
       Raise(128 * Ramp(d, kChar, kBrown) + 127 * Ramp(d, kSlit, kChar), texel + 2);
       if (d < kSlit && texel[3] >= 128) {
         texel[3] = 0;
+        ++removals_;
         MarkRim(x, y);
       }
     }

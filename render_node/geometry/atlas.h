@@ -2,6 +2,7 @@
 // 4096 x 4096 texels that a patch's origin can address only the part that the sheet uses is stored. Pure.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -58,6 +59,30 @@ class Atlas {
   /// Whether the sheet is shown as removed at (s, t) [m]: the border lies between texels, as in the shaders.
   [[nodiscard]] bool Removed(const Vec2f& material) const;
 
+  /// Nearness of removed tissue at (s, t) [m] as the shaders sample it: 1 there, 0 from kRim_m on.
+  [[nodiscard]] float Nearness(const Vec2f& material) const;
+  /// Number of texels that have been removed or, by a patch, restored: the same number, the same cuts.
+  [[nodiscard]] std::uint64_t removals() const { return removals_; }
+  /// Number of patches and paintings that have been applied: the same number, the same texels.
+  [[nodiscard]] std::uint64_t patches() const { return patches_; }
+  /// visit(x, y) for the squares of texels (x, y) to (x + 1, y + 1) in and beside the blocks with removed texels.
+  template <class Visit>
+  void ForEachSquareNearCuts(const Visit& visit) const {
+    const int blocks_y = (height_ + kBlock - 1) / kBlock;
+    const auto cut = [&](int bx, int by) {
+      return bx < blocks_x_ && by < blocks_y && cut_[static_cast<std::size_t>(by * blocks_x_ + bx)] != 0;
+    };
+    for (int by = 0; by < blocks_y; ++by) {
+      for (int bx = 0; bx < blocks_x_; ++bx) {
+        // A square on the border of a block reaches into the next one.
+        if (!cut(bx, by) && !cut(bx + 1, by) && !cut(bx, by + 1) && !cut(bx + 1, by + 1)) continue;
+        for (int y = by * kBlock; y < std::min((by + 1) * kBlock, height_ - 1); ++y) {
+          for (int x = bx * kBlock; x < std::min((bx + 1) * kBlock, width_ - 1); ++x) visit(x, y);
+        }
+      }
+    }
+  }
+
   /// True if tissue has been damaged or cut in the block of 16 x 16 texels at (s, t) [m].
   [[nodiscard]] bool Touched(const Vec2f& material) const;
   /// Number of blocks for which Touched() has become true.
@@ -70,8 +95,10 @@ class Atlas {
   [[nodiscard]] std::span<const std::uint8_t> texels() const { return texels_; }
 
  private:
+  static constexpr int kBlock = 16;  // Texels.
   [[nodiscard]] bool Covered(int x, int y) const;
   void MarkRim(int x, int y);
+  void MarkRimsAgain(const AtlasRect& rect);
   void Touch(const AtlasRect& rect);
   AtlasRect PaintCapsule(const Vec2f& a, const Vec2f& b);
 
@@ -86,7 +113,9 @@ class Atlas {
   AtlasRect film_change_;
   std::vector<std::uint8_t> covered_;  // Per block of kBlock x kBlock texels.
   std::vector<std::uint8_t> touched_;  // Per block.
+  std::vector<std::uint8_t> cut_;      // Per block: texels have been removed.
   std::uint64_t touches_ = 0;
+  std::uint64_t removals_ = 0, patches_ = 0;
   std::vector<std::uint8_t> painted_;  // Per membrane triangle: bits of the dead edges that are already drawn.
 };
 

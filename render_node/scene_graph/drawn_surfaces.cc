@@ -19,8 +19,9 @@
 namespace fulcrum::render {
 namespace {
 
-constexpr std::array<std::string_view, 11> kSurfaces{
-    "rectum", "organ", "fat", "membrane", "surroundings", "breathing", "hook", "grasper", "jaw", "blade", "instrument"};
+constexpr std::array<std::string_view, 12> kSurfaces{"rectum",  "organ",        "fat",       "membrane",
+                                                     "cut",     "surroundings", "breathing", "hook",
+                                                     "grasper", "jaw",          "blade",     "instrument"};
 constexpr std::array<std::string_view, 1> kBurns{"burn"};
 
 class Collector final : public osg::NodeVisitor {

@@ -322,7 +322,7 @@ bool LaparoscopeView::DrawsBackgroundAtRest() const { return impl_->optics.Draws
 
 void LaparoscopeView::Update() {
   impl_->ShowFat();
-  if (impl_->layers.Update()) {
+  if (impl_->layers.Update(impl_->atlas)) {
     impl_->optics.SceneChanged();
     impl_->tools_moved = true;
   }

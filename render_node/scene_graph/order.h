@@ -7,7 +7,19 @@ namespace fulcrum::render {
 
 /// Opaque parts first, near to far, so that hidden fragments are not shaded; then translucent layers, from the inside
 /// out.
-enum class Order { kBackground, kMask, kInstruments, kRectum, kSurroundings, kBurn, kFat, kMembrane, kShadow, kSmoke };
+enum class Order {
+  kBackground,
+  kMask,
+  kInstruments,
+  kRectum,
+  kSurroundings,
+  kBurn,
+  kFat,
+  kMembrane,
+  kCut,
+  kShadow,
+  kSmoke
+};
 
 /// Texture units; the samplers of all programs are bound once at the scene's root, but for the burns of solids, which
 /// most sessions do not have. Units 6 and 7 are those of optics.cc and overlay.cc.

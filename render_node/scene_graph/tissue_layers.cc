@@ -68,7 +68,8 @@ TissueLayers::TissueLayers(const SceneView& scene, std::span<const Laparoscope> 
       detail_(scene.membrane),
       fat_(scene, kFatStride),
       rim_(SheetRim(scene)),
-      burn_(scene) {
+      burn_(scene),
+      cut_(scene) {
   xyz_.resize(3 * scene.rest_position.size());
   for (std::size_t i = 0; i < scene.rest_position.size(); ++i) {
     Eigen::Map<Vec3f>(xyz_.data() + 3 * i) = scene.rest_position[i];
@@ -143,8 +144,8 @@ void TissueLayers::AddSheets() {
     Blend(layer->mesh->state());
     layer->mesh->state()->addUniform(new osg::Uniform("behind", kFatBehind));
   }
-  const bool printed = scene_.thermal.model == ThermalModel::kPaper && scene_.thermal.as == PaperForm::kPrinted;
-  Add(&sheet_, "membrane", Order::kMembrane, MakeProgram("surface.vert", "membrane.frag", printed ? "AS_PRINTED" : ""));
+  Add(&sheet_, "membrane", Order::kMembrane,
+      MakeProgram("surface.vert", "membrane.frag", ShowsCuts() ? "" : "AS_PRINTED"));
   Blend(sheet_.mesh->state());
   sheet_.mesh->state()->addUniform(new osg::Uniform("fascia_depth", kFasciaDepth));
   const auto around = SurroundingColour(SurfaceRole::kRetroperitoneum);
@@ -215,9 +216,9 @@ void TissueLayers::RehearseBurn(bool on) {
   rehearsing_ = on;
   fat_chosen_ = false;
   UpdateFat();
-  if (!SolidsBurn(scene_)) return;
   if (!on) {
     burn_.EndRehearsal(geode_);
+    cut_.EndRehearsal(geode_);
     return;
   }
   // A piece of a centimetre, twice as near as what the scope looks at.
@@ -225,14 +226,20 @@ void TissueLayers::RehearseBurn(bool on) {
   const Vec3f middle = 0.5f * (eye_W_ + scene_.render.scope_target_W);
   const Vec3f normal = (eye_W_ - middle).normalized();
   const Vec3f u = kHalf_m * normal.unitOrthogonal(), v = normal.cross(u);
-  burn_.Rehearse({middle - u - v, middle + u - v, middle + v}, normal, geode_);
+  const std::array<Vec3f, 3> corners{middle - u - v, middle + u - v, middle + v};
+  if (ShowsCuts()) cut_.Rehearse(corners, normal, geode_);
+  if (SolidsBurn(scene_)) burn_.Rehearse(corners, normal, geode_);
 }
 
-bool TissueLayers::Update() {
-  if (!tissue_changed_ && !topology_changed_ && !scope_changed_ && !burn_.grown()) {
+bool TissueLayers::Update(const Atlas& atlas) {
+  const bool recut = ShowsCuts() && cut_.HasChanged(atlas);
+  if (!tissue_changed_ && !topology_changed_ && !scope_changed_ && !recut && !burn_.grown()) {
     return false;
   }
   UpdateMembrane();
+  if (ShowsCuts()) {
+    cut_.Update(atlas, membrane_, topology_changed_, eye_W_, detail_factor_ * pixels_per_rad_, &field_, geode_);
+  }
   UpdateFat();
   if (tissue_changed_ || scope_changed_) {
     if (tissue_changed_) UpdateSolids();
@@ -248,6 +255,10 @@ bool TissueLayers::Update() {
   burn_.Update(solid_positions_, solid_normals_, &field_);
   tissue_changed_ = topology_changed_ = scope_changed_ = false;
   return true;
+}
+
+bool TissueLayers::ShowsCuts() const {
+  return !(scene_.thermal.model == ThermalModel::kPaper && scene_.thermal.as == PaperForm::kPrinted);
 }
 
 void TissueLayers::UpdateSolids() {

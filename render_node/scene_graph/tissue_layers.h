@@ -15,6 +15,7 @@
 #include "render_node/geometry/sheet_detail.h"
 #include "render_node/geometry/sheet_rim.h"
 #include "render_node/scene_graph/burn_layer.h"
+#include "render_node/scene_graph/cut_layer.h"
 #include "render_node/scene_graph/mesh.h"
 #include "render_node/scene_graph/order.h"
 
@@ -39,10 +40,10 @@ class TissueLayers {
   void ShowFat(const std::function<bool(const Vec2f& material, float thickness)>& visible,
                const std::function<bool(const Vec2f& material)>& opened);
   /// Adds what only a burn shows, so that its shaders are compiled, or removes it: all fat as bared and, where solids
-  /// burn, a piece of burnt tissue in front of everything (BurnLayer::Rehearse).
+  /// burn, a piece of burnt tissue in front of everything (BurnLayer::Rehearse), and a piece of a lip.
   void RehearseBurn(bool on);
-  /// Updates the meshes. Returns false if nothing has changed.
-  bool Update();
+  /// Updates the meshes. Returns false if nothing has changed. @param atlas of the sheet.
+  bool Update(const Atlas& atlas);
 
   [[nodiscard]] const MembraneMesh& membrane() const { return membrane_; }
   [[nodiscard]] std::span<const float> rim() const { return rim_; }  ///< Of SheetRim().
@@ -64,6 +65,8 @@ class TissueLayers {
     Index first_vertex, vertex_count;
     std::vector<Triangle> triangles;  ///< Of its own vertices.
   };
+  /// False where the paper's colours are drawn to the letter: they have no holes.
+  [[nodiscard]] bool ShowsCuts() const;
   void AddSolids();
   void AddSolid(const fulcrum::Solid& solid);  // Not the one of geometry/solid.h.
   void AddSheets();
@@ -96,6 +99,7 @@ class TissueLayers {
   osg::ref_ptr<osg::Program> solid_program_;  ///< Of all solids: the rasteriser compiles each program.
   std::vector<SolidLayer> solids_;
   BurnLayer burn_;
+  CutLayer cut_;
   Layer fat_layer_, beneath_layer_, sheet_;
 };
 

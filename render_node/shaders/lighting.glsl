@@ -53,6 +53,7 @@ vec3 AroundTheSheet(vec3 colour, float fat, vec4 noise) {
 // of 0.3 mm has the thickness 1 here: 7.6 lengths of absorption of green light, as haemoglobin of 150 g/l has.
 uniform sampler2D film_map;
 uniform vec2 film_per_metre; // Coordinates of film_map per metre of material.
+const float kLipNearness = 0.55; // Where lips begin (geometry/cut_lip.h).
 
 // Tissue seen through a film of blood, by Beer and Lambert: haemoglobin absorbs blue and green long before red, so thin
 // blood is bright and thick blood dark. Blood scatters a little light itself.

@@ -66,6 +66,7 @@ void main() {
   float edge = 0.0; // No holes, no rims.
 #else
   float edge = wet_film.g;
+  if (edge > kLipNearness) discard; // There the lips of the cut are drawn (cut.frag).
 #endif
   float vessel = noise.a;
   float celsius = 20.0 + 127.5 * heat.r;
@@ -107,10 +108,9 @@ void main() {
   float hot = colour_by_temperature * clamp((celsius - 45.0) / 55.0, 0.0, 1.0);
   albedo = mix(albedo, vec3(0.22, 0.075, 0.022), hot);
   alpha = mix(alpha, 0.95, hot);
-  // The rim of a slit draws back: thick, blanched, at the cut tan and, where it is dry, brown.
-  float lip = smoothstep(0.42, 0.85, edge);
-  vec3 seam = mix(vec3(0.44, 0.22, 0.09), vec3(0.16, 0.060, 0.022), brown);
-  albedo = mix(albedo, mix(vec3(0.84, 0.64, 0.50), seam, smoothstep(0.80, 0.97, edge + 0.35 * bend.z)), 0.8 * lip);
+  // Towards the lips of a slit it is thick and blanched, as their flat part is.
+  float lip = smoothstep(0.25, kLipNearness, edge + 0.15 * bend.z);
+  albedo = mix(albedo, vec3(0.85, 0.62, 0.49), 0.7 * lip);
   alpha = mix(alpha, 0.90, lip);
   // Blood lies on top, and seeps away where the sheet ends on the organ. A clot is darker and duller.
   float blood = 2.0 * wet_film.r * (1.0 - (coordinate.w < 0.0 ? smoothstep(0.5, 0.95, -coordinate.w) : smoothstep(0.93, 1.0, coordinate.w)));
@@ -136,11 +136,10 @@ void main() {
   vec3 fascia = mix(vec3(0.86, 0.76, 0.66), vec3(0.26, 0.10, 0.035), seared);
   vec4 upper = vec4(albedo, heat.a < 0.5 ? 0.0 : alpha);
   vec4 lower = vec4(fascia, heat_below.a < 0.5 ? 0.0 : mix(0.09 + 0.30 * strand, 0.9, max(seared, tanned)));
-  // A line of sight that enters through the slit of the nearer layer and meets the farther one has met the wall of the
-  // cut between the two.
+  // A line of sight that enters through the slit of the fascia from beneath and meets the peritoneum has met the wall of
+  // the cut between the two; from above the lip is before it.
   bool from_above = dot(normal, position) < 0.0;
   vec4 raw = vec4(mix(mix(vec3(0.80, 0.52, 0.40), vec3(0.56, 0.33, 0.17), tanned), vec3(0.26, 0.12, 0.05), seared), 0.97);
-  if (from_above && heat.a < 0.5) lower = raw;
   if (!from_above && heat_below.a < 0.5) upper = raw;
 #ifdef AS_PRINTED
   float v = clamp((celsius - printed_limits.x) / (printed_limits.y - printed_limits.x), 0.0, 1.0);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "render_node/geometry/cut_lip.h"
+
 namespace fulcrum::replay {
 namespace {
 
@@ -51,7 +53,8 @@ TruthClass ClassOfSurface(const DrawnSurface& surface, const std::array<ToolKind
   if (surface.name == "rectum") return TruthClass::kRectum;
   if (surface.name == "organ") return TruthClass::kOrgan;
   if (surface.name == "fat") return TruthClass::kFat;
-  return surface.name == "membrane" ? TruthClass::kMembrane : TruthClass::kSurroundings;
+  const bool of_sheet = surface.name == "membrane" || surface.name == "cut";
+  return of_sheet ? TruthClass::kMembrane : TruthClass::kSurroundings;
 }
 
 /// A value of a triangle, made once for neighbours in a row that show the same one.
@@ -143,9 +146,10 @@ void Truth::Draw(const render::Atlas& atlas) {
       return Between(surface.coordinates, surface.triangles[triangle], {0, triangle, b1, b2, 0});
     };
     if (surface.name == "membrane") {
-      options.shown = [=](std::uint32_t triangle, float b1, float b2) {
+      options.shown = [=, &atlas](std::uint32_t triangle, float b1, float b2) {
         const Corner corner = at(triangle, b1, b2);
-        return corner[2] >= 0 && !removed(corner);
+        // Beside a cut its lips are shown instead.
+        return corner[2] >= 0 && !removed(corner) && atlas.Nearness({corner[0], corner[1]}) <= render::kLipNearness;
       };
     } else if (surface.name == "fat") {
       options.shown = [=](std::uint32_t triangle, float b1, float b2) {

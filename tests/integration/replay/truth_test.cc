@@ -30,7 +30,7 @@ using render::LaparoscopeView;
 TruthClass ClassNamed(const std::string& name) {
   if (name == "rectum") return TruthClass::kRectum;
   if (name == "fat") return TruthClass::kFat;
-  if (name == "membrane") return TruthClass::kMembrane;
+  if (name == "membrane" || name == "cut") return TruthClass::kMembrane;
   if (name == "surroundings" || name == "breathing") return TruthClass::kSurroundings;
   return name == "mask" ? TruthClass::kNone : TruthClass::kGrasper;  // Any instrument.
 }
@@ -233,8 +233,9 @@ TEST_F(TruthTest, MasksAreThoseOfFourTimesTheLines) {
   }
   rule.Expect("finer_same_samples");
   // The class at a pixel's centre and that of its larger part differ at the ends and bends of a border: of a strip ten
-  // pixels wide, as bared fat is, this is 2 %. No rule that looks at the centre can reach more.
-  limit.Expect("finer_limit_of_centres", 0.975);
+  // pixels wide with strands of less than a pixel across it, as bared fat is, this is 2.5 %. No rule that looks at the
+  // centre can reach more.
+  limit.Expect("finer_limit_of_centres", 0.970);
   masks.Expect("finer", std::min(0.98, limit.Of(TruthClass::kFat) - 0.002));
 }
 
