@@ -75,7 +75,7 @@ bool Bleeding::Update(double session_time_s, const MembraneMesh& membrane, std::
     time_s_ = session_time_s;
     return false;
   }
-  fluid_.SetShape(membrane);
+  fluid_.SetShape(membrane, atlas);
   static_assert(kMostSteps > kStepsOfAge);
   time_s_ = std::max(time_s_, session_time_s - kMostSteps * SheetFluid::kStep_s);
   for (; time_s_ + SheetFluid::kStep_s <= session_time_s; time_s_ += SheetFluid::kStep_s) {

@@ -140,8 +140,9 @@ double SheetFluid::Bleed(const Vec2f& material, double volume_m3) {
   return VolumeOf(columns_[cell].blood - before);
 }
 
-void SheetFluid::SetShape(const MembraneMesh& membrane) {
+void SheetFluid::SetShape(const MembraneMesh& membrane, const Atlas* atlas) {
   sheet_ = &membrane;
+  atlas_ = atlas;
   ++shape_;
   // Of one cell against its height when all came to rest, so that slow motion adds up.
   constexpr float kMoved_m = 2e-5f;
@@ -167,13 +168,18 @@ void SheetFluid::FindShape(Cell cell) {
   place_[cell] = a + at.b1 * (b - a) + at.b2 * (c - a);
   const Vec3f normal = (b - a).cross(c - a);
   steepness_[cell] = std::max(kSteepest, std::abs(normal.z()) / std::max(normal.norm(), 1e-12f));
+  const auto row = static_cast<Cell>(width_ + 2);
   if (std::isnan(rough_[cell])) {
-    const auto row = static_cast<Cell>(width_ + 2);
     const float s = kWave_per_m * cell_m_ * static_cast<float>(cell % row);
     const float t = kWave_per_m * cell_m_ * static_cast<float>(cell / row);
     rough_[cell] = kRough_m * std::sin(s + std::sin(0.43f * t)) * std::sin(0.9f * t + std::sin(0.52f * s));
   }
   place_[cell].z() += rough_[cell];
+  if (atlas_ != nullptr && atlas_->removals() > 0) {
+    // Its index counts the border around the sheet.
+    const Vec2f middle(static_cast<float>(cell % row) - 0.5f, static_cast<float>(cell / row) - 0.5f);
+    if (atlas_->Removed(cell_m_ * middle)) place_[cell].z() -= kSlit_m;
+  }
   level_[cell] = place_[cell].z();
 }
 

@@ -39,8 +39,10 @@ class SheetFluid {
   /// Adds blood around (s, t) [m]. Returns the volume that was added: 0 beside the sheet [m^3].
   double Bleed(const Vec2f& material, double volume_m3);
 
-  /// Takes the present shape of the sheet.
-  void SetShape(const MembraneMesh& membrane);
+  /// Takes the present shape of the sheet and, from its atlas, where it is cut: there liquid lies in the slit, kSlit_m
+  /// lower. Both must outlive the calls of Step. Without an atlas nothing is cut.
+  void SetShape(const MembraneMesh& membrane, const Atlas* atlas = nullptr);
+  static constexpr float kSlit_m = 0.0012f;  ///< Assumed: what is bared lies so far below the sheet.
 
   /// One step of kStep_s. @pre SetShape has been called since the last Bleed on a dry sheet.
   void Step(std::span<const WorkingTube> tubes);
@@ -115,6 +117,7 @@ class SheetFluid {
   std::vector<std::uint8_t> is_wet_;  // In wet_.
   std::vector<Cell> wet_;
   const MembraneMesh* sheet_ = nullptr;
+  const Atlas* atlas_ = nullptr;
   std::uint32_t shape_ = 0;
   AtlasRect changed_;  // In cells.
   bool flows_ = false, ages_ = false;

@@ -382,6 +382,7 @@ int main(int argc, char** argv) {
     }
     render::ReadBack(view, &report);
     render::Edges(view, &report);
+    render::CutFigures(view, &report);
     render::Flicker(view, &report);
     render::Smoothing(view, &report);
     render::LookFigures(view, &report);

@@ -36,6 +36,9 @@ constexpr std::pair<const char*, float> kSampledScales[] = {
 /// a table in lines `# |`.
 void LookFigures(const SceneView& built_in, benchmark::Report* report);
 
+/// render.cut.*: cost of the lips and strands of a whole cut.
+void CutFigures(const SceneView& scene, benchmark::Report* report);
+
 /// render.temporal_flicker.*: edges while the scope creeps.
 void Flicker(const SceneView& scene, benchmark::Report* report);
 

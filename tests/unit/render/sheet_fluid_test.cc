@@ -130,6 +130,46 @@ TEST_F(SheetFluidTest, AFilmOnASlopeFlowsAsNusseltsDoes) {
   ExpectConserved(fluid);
 }
 
+TEST_F(SheetFluidTest, RunsIntoASlitAndOverItsOtherLipOnlyWhenItIsFull) {
+  Shape([](const Vec2f& p) { return -0.3f * p.y(); });
+  // A slit across the way down, 2 mm wide, from 5 mm below the source on.
+  Atlas atlas(view_);
+  TemperaturePatch patch;
+  patch.header.origin_x = static_cast<std::uint32_t>(std::max(0.0f, middle_.x() - 0.0128f) / atlas.texel_m());
+  patch.header.origin_y = static_cast<std::uint32_t>((middle_.y() + 0.004f) / atlas.texel_m());
+  patch.texels.assign(4u * kPatchTexels * kPatchTexels, 255);
+  for (std::size_t y = 10; y < 30; ++y) {
+    for (std::size_t x = 8; x < kPatchTexels - 8; ++x) patch.texels[4 * (y * kPatchTexels + x) + 3] = 0;
+  }
+  ASSERT_FALSE(atlas.Apply(patch).empty());
+  const auto lies = [&](const SheetFluid& fluid, float from_m, float to_m) {
+    double sum = 0;
+    const float cell = 4 * atlas.texel_m();
+    for (float t = from_m; t < to_m; t += cell) {
+      for (float s = -0.015f; s < 0.015f; s += cell) {
+        sum += static_cast<double>(fluid.At(middle_ + Vec2f(s, t)).liquid() * cell * cell);
+      }
+    }
+    return sum;
+  };
+  SheetFluid cut(view_, {}), whole(view_, {});
+  for (SheetFluid* fluid : {&cut, &whole}) {
+    const Atlas* shown = fluid == &cut ? &atlas : nullptr;
+    fluid->SetShape(membrane_, shown);
+    poured_m3_ = 0;
+    for (int k = 0; k < 4 * kASecond; ++k) {
+      poured_m3_ += fluid->Bleed(middle_, kMm3 * 12 / (4 * kASecond));
+      fluid->Step({});
+    }
+    for (int k = 0; k < 4 * kASecond; ++k) fluid->Step({});
+    ExpectConserved(*fluid);
+  }
+  const double beyond = lies(whole, 0.0075f, 0.02f);
+  ASSERT_GT(beyond, 1 * kMm3) << "an uncut sheet lets it run past the place of the slit";
+  EXPECT_LT(lies(cut, 0.0075f, 0.02f), 0.05 * beyond);
+  EXPECT_GT(lies(cut, 0.0045f, 0.0075f), lies(whole, 0.0045f, 0.0075f));
+}
+
 TEST_F(SheetFluidTest, ASideThatTissueContinuesHoldsItBack) {
   Shape([](const Vec2f& p) { return -0.6f * p.x(); });
   const std::vector<float> rim(view_.membrane.node_count(), 1.0f);
