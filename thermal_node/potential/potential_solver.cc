@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 
 #include "thermal_node/heat/wide.h"
 #include "thermal_node/potential/multigrid.h"
@@ -16,6 +15,8 @@ constexpr int kMaxIterations = 60;  ///< Bound of the run time.
 /// Number of partial sums. Their order is fixed, so the result has the same bits on every CPU.
 constexpr int kLanes = 32;
 static_assert(kWindow % kLanes == 0);
+
+using Field = Fine::Field;
 
 FULCRUM_WIDE
 float Dot(const Field& a, const Field& b) {
@@ -65,10 +66,10 @@ void Add(float f, const Field& x, Field* y) {
 /// Face conductances of the finest level. The halo of sigma is 0, which closes the window's border; the current that
 /// leaves the window is part of `ground`.
 FULCRUM_WIDE
-void SetFaces(const Field& sigma, float face_s, float face_t, Level* fine) {
-  const int up = fine->stride;
+void SetFaces(const Field& sigma, float face_s, float face_t, Fine* fine) {
+  constexpr int up = Fine::kStride;
   for (int j = 0; j <= kWindow; ++j) {
-    const int o = fine->At(0, j);
+    const int o = Fine::At(0, j);
     const float* __restrict s = &sigma[o];
     float* __restrict fx = &fine->face_x[o];
     float* __restrict fy = &fine->face_y[o];
@@ -82,9 +83,10 @@ void SetFaces(const Field& sigma, float face_s, float face_t, Level* fine) {
 /// Heat of one row of cells. Each cell is crossed by four half faces of resistance 1 / (2 sigma face), so a current I
 /// leaves I^2 / (2 sigma face) in it.
 FULCRUM_WIDE
-void RowHeat(const Level& fine, const Field& voltage, const Field& sigma, float face_s, float face_t, int j,
+void RowHeat(const Fine& fine, const Field& voltage, const Field& sigma, float face_s, float face_t, int j,
              const float* __restrict contact, const float* __restrict lost, float* __restrict q) {
-  const int o = fine.At(0, j), up = fine.stride;
+  constexpr int up = Fine::kStride;
+  const int o = Fine::At(0, j);
   const float* __restrict v = &voltage[o];
   const float* __restrict s = &sigma[o];
   const float* __restrict fx = &fine.face_x[o];
@@ -133,32 +135,26 @@ void AddRow(const float* __restrict contact, const float* __restrict lost, const
 }  // namespace
 
 struct PotentialSolver::Multigrid {
-  Multigrid() {
-    for (int n = kWindow; n >= 2; n /= 2) levels.emplace_back(n);
-    const std::size_t count = levels[0].count;
-    for (auto* field : {&v, &p, &ap, &contact, &sigma}) field->assign(count, 0.0f);
-  }
-  std::vector<Level> levels;
-  Field v;  ///< Solution, and start of the next solve.
-  Field p, ap, contact, sigma;
+  Grid<kWindow> grid;
+  alignas(64) Field v{};  ///< Solution, and start of the next solve.
+  alignas(64) Field p{}, ap{}, contact{}, sigma{};
 };
 
 PotentialSolver::PotentialSolver() : grid_(std::make_unique<Multigrid>()) {}
 PotentialSolver::~PotentialSolver() = default;
 
-float PotentialSolver::Voltage(int i, int j) const { return grid_->v[grid_->levels[0].At(i, j)]; }
+float PotentialSolver::Voltage(int i, int j) const { return grid_->v[Fine::At(i, j)]; }
 
 PotentialResult PotentialSolver::Solve(const PotentialProblem& problem, float tolerance) {
-  Level& fine = grid_->levels[0];
+  Fine& fine = grid_->grid.level;
   for (int j = 0; j < kWindow; ++j) {
-    const int o = fine.At(0, j), k = j * kWindow;
+    const int o = Fine::At(0, j), k = j * kWindow;
     std::copy_n(&problem.sigma[k], kWindow, &grid_->sigma[o]);
     std::copy_n(&problem.contact[k], kWindow, &grid_->contact[o]);
     std::transform(&problem.contact[k], &problem.contact[k] + kWindow, &problem.ground[k], &fine.mass[o], std::plus{});
   }
   SetFaces(grid_->sigma, problem.face_s, problem.face_t, &fine);
-  fine.Finish();
-  for (std::size_t l = 1; l < grid_->levels.size(); ++l) Coarsen(grid_->levels[l - 1], &grid_->levels[l]);
+  SetUp(&grid_->grid);
 
   int iterations = Iterate(tolerance);
   PotentialResult result = Evaluate(problem);
@@ -173,27 +169,27 @@ PotentialResult PotentialSolver::Solve(const PotentialProblem& problem, float to
 
 int PotentialSolver::Iterate(float tolerance) {
   Multigrid& g = *grid_;
-  Level& fine = g.levels[0];
+  Fine& fine = g.grid.level;
   const float contact_sum = Sum(g.contact);
   if (!(contact_sum > 0.0f)) {
     std::fill(g.v.begin(), g.v.end(), 0.0f);
     return 0;
   }
-  // fine.b holds the residual r, the input of the V-cycle; fine.x holds its result z.
-  fine.Apply(g.v.data(), g.ap.data());
+  // fine.b holds the residual r, the input of the V-cycle; fine.z holds its result.
+  Apply(fine, g.v, &g.ap);
   fine.b = g.contact;
   Add(-1.0f, g.ap, &fine.b);
   float rz = 0;
   for (int k = 0; k < kMaxIterations; ++k) {
-    VCycle(&g.levels, 0);
-    const float rz_new = Dot(fine.b, fine.x);
+    VCycle(&g.grid);
+    const float rz_new = Dot(fine.b, fine.z);
     // r.z estimates the energy of the error, the conductance is the energy of the solution.
     const float conductance = contact_sum - Dot(g.contact, g.v);
     const bool last = !(rz_new > tolerance * tolerance * conductance);
     if (!(rz_new > 0.0f)) return k;
-    ScaleAdd(fine.x, k == 0 ? 0.0f : rz_new / rz, &g.p);
+    ScaleAdd(fine.z, k == 0 ? 0.0f : rz_new / rz, &g.p);
     rz = rz_new;
-    fine.Apply(g.p.data(), g.ap.data());
+    Apply(fine, g.p, &g.ap);
     const float alpha = rz / Dot(g.p, g.ap);
     Add(alpha, g.p, &g.v);
     if (last) return k + 1;  // the V-cycle is computed already, so its step is taken
@@ -204,7 +200,7 @@ int PotentialSolver::Iterate(float tolerance) {
 
 PotentialResult PotentialSolver::Evaluate(const PotentialProblem& problem) {
   Multigrid& g = *grid_;
-  const Level& fine = g.levels[0];
+  const Fine& fine = g.grid.level;
   Balance balance;
   for (int j = 0; j < kWindow; ++j) {
     const float* contact = &problem.contact[j * kWindow];
@@ -212,7 +208,7 @@ PotentialResult PotentialSolver::Evaluate(const PotentialProblem& problem) {
     const float* lost_row = &problem.lost[j * kWindow];
     RowHeat(fine, g.v, g.sigma, problem.face_s, problem.face_t, j, contact, lost_row, q);
     const double before = balance.heat;
-    AddRow(contact, lost_row, &problem.ground[j * kWindow], &g.v[fine.At(0, j)], q, &balance);
+    AddRow(contact, lost_row, &problem.ground[j * kWindow], &g.v[Fine::At(0, j)], q, &balance);
     row_heat_[j] = static_cast<float>(balance.heat - before);
   }
   const auto& [in, heat, lost, grounded] = balance;
@@ -245,7 +241,7 @@ void PotentialSolver::ExportStart(std::array<float, kWindowCells>* start) const 
 void PotentialSolver::ImportStart(const std::array<float, kWindowCells>& start) {
   std::fill(grid_->v.begin(), grid_->v.end(), 0.0f);
   for (int j = 0; j < kWindow; ++j) {
-    for (int i = 0; i < kWindow; ++i) grid_->v[grid_->levels[0].At(i, j)] = start[j * kWindow + i];
+    for (int i = 0; i < kWindow; ++i) grid_->v[Fine::At(i, j)] = start[j * kWindow + i];
   }
 }
 
