@@ -24,23 +24,30 @@ namespace {
 /// of f - f'' / 12 is of fourth order where f is smooth. The result is limited to between 0 and `gain` times the
 /// two-point flux, so it remains a conductance times the difference of the two cells: the maximum principle holds,
 /// closed faces stay closed, and both cells of the face get the same flux.
-/// `smooth` is 1, or 0 for the two-point flux; a product, because a choice is not vectorised.
-[[gnu::always_inline]] inline float FourthOrder(float before, float flux, float after, float gain, float smooth) {
-  const float fourth = (14.0f / 12.0f) * flux - (1.0f / 12.0f) * (before + after);
-  const float f = smooth * fourth + (1.0f - smooth) * flux;
+[[gnu::always_inline]] inline float Limited(float f, float flux, float gain) {
   const float most = gain * flux;
   const float low = most < 0.0f ? most : 0.0f, high = most > 0.0f ? most : 0.0f;
   const float above = f > low ? f : low;
   return above < high ? above : high;
 }
+/// The limited flux; with kFront, where `smooth` is 0 instead of 1, the two-point flux: a product, because a choice is
+/// not vectorised.
+template <bool kFront>
+[[gnu::always_inline]] inline float FourthOrder(float before, float flux, float after, float gain,
+                                                const float* __restrict smooth) {
+  const float fourth = (14.0f / 12.0f) * flux - (1.0f / 12.0f) * (before + after);
+  if constexpr (!kFront) return Limited(fourth, flux, gain);
+  return Limited(*smooth * fourth + (1.0f - *smooth) * flux, flux, gain);
+}
 
-/// One stage for the rows of the tile: enthalpy <- enthalpy + dt dH/dt, with `loss` = dt times the sink per kelvin. In
-/// the last stage the result is averaged with the enthalpy before the step, whose weight is `first`; see DiffuseIsland.
-template <bool kLast, bool kSheared, bool kFront>
-[[gnu::always_inline]] inline void Stage(Tile* tile, float dt_s, float gain, float loss, float first) {
+/// One stage for the rows of the tile: enthalpy <- enthalpy + dt dH/dt, with `loss` = dt times the sink per kelvin.
+/// kMain, kAnti: the tile has links along that diagonal.
+template <bool kMain, bool kAnti, bool kFront>
+[[gnu::always_inline]] inline void Stage(Tile* tile, float dt_s, float gain, float loss) {
   // Each pass covers the whole tile: a shifted read of values that were just written would stall until the store has
   // completed.
-  alignas(64) float across_s[kTile * kFaceStride], across_t[(kTile + 3) * kTile], face_s[kTile * kFaceStride];
+  alignas(64) float across_s[kTile * kFaceStride], across_t[(kTile + 3) * kTile];
+  alignas(64) float face_s[kTile * kFaceStride], face_t[(kTile + 1) * kTile];
   for (int j = -1; j <= kTile + 1; ++j) {
     const float* __restrict t = &tile->theta[ThetaIndex(0, j)];
     const float* __restrict g = &tile->face_t[FaceT(0, j)];
@@ -57,78 +64,51 @@ template <bool kLast, bool kSheared, bool kFront>
     const float* __restrict f = &across_s[FaceS(0, j)];
     const float* __restrict smooth = kFront ? &tile->smooth_s[FaceS(0, j)] : nullptr;
     float* __restrict face = &face_s[FaceS(0, j)];
-    for (int i = 0; i <= kTile; ++i) face[i] = FourthOrder(f[i - 1], f[i], f[i + 1], gain, kFront ? smooth[i] : 1.0f);
+    for (int i = 0; i <= kTile; ++i) face[i] = FourthOrder<kFront>(f[i - 1], f[i], f[i + 1], gain, smooth + i);
   }
-  alignas(64) float above[kTile], below[kTile];
-  for (int i = 0; i < kTile; ++i) {
-    const float* f = &across_t[FaceT(i, 0)];
-    below[i] = FourthOrder(f[-kTile], f[0], f[kTile], gain, kFront ? tile->smooth_t[FaceT(i, 0)] : 1.0f);
+  const float* __restrict smooth_t = kFront ? &tile->smooth_t[FaceT(0, 0)] : nullptr;
+  const float* __restrict f = &across_t[FaceT(0, 0)];
+  for (int i = 0; i < (kTile + 1) * kTile; ++i) {
+    face_t[i] = FourthOrder<kFront>(f[i - kTile], f[i], f[i + kTile], gain, smooth_t + i);
   }
   for (int j = 0; j < kTile; ++j) {
     const float* __restrict t = &tile->theta[ThetaIndex(0, j)];
     const float* __restrict fs = &face_s[FaceS(0, j)];
-    const float* __restrict ft = &across_t[FaceT(0, j + 1)];
+    const float* __restrict ft = &face_t[j * kTile];
     const float* __restrict inverse_area = &tile->geometry.inverse_area[j * kTile];
     float* __restrict h = &tile->state.enthalpy[j * kTile];
-    const float* __restrict before = &tile->before[j * kTile];
-    const float* __restrict smooth = kFront ? &tile->smooth_t[FaceT(0, j + 1)] : nullptr;
-    for (int i = 0; i < kTile; ++i) above[i] = below[i];
+    const float* __restrict l = kMain || kAnti ? &tile->links[Corner(0, j)] : nullptr;
     for (int i = 0; i < kTile; ++i) {
-      below[i] = FourthOrder(ft[i - kTile], ft[i], ft[i + kTile], gain, kFront ? smooth[i] : 1.0f);
-    }
-    const float* __restrict l = kSheared ? &tile->links[Corner(0, j)] : nullptr;
-    for (int i = 0; i < kTile; ++i) {
-      float flux = (fs[i] - fs[i + 1]) + (above[i] - below[i]);
-      if constexpr (kSheared) {
-        const float* up = &t[i - kThetaStride];
-        const float* down = &t[i + kThetaStride];
-        flux += Main(l[i]) * (up[-1] - t[i]) + Main(l[i + kCornerStride + 1]) * (down[1] - t[i]) +
-                Anti(l[i + 1]) * (up[1] - t[i]) + Anti(l[i + kCornerStride]) * (down[-1] - t[i]);
-      }
-      const float after = h[i] + (dt_s * inverse_area[i] * flux - loss * t[i]);
-      h[i] = kLast ? after + first * (before[i] - after) : after;
+      float flux = (fs[i] - fs[i + 1]) + (ft[i] - ft[i + kTile]);
+      const float* up = &t[i - kThetaStride];
+      const float* down = &t[i + kThetaStride];
+      float linked = 0;
+      if constexpr (kMain) linked = Main(l[i]) * (up[-1] - t[i]) + Main(l[i + kCornerStride + 1]) * (down[1] - t[i]);
+      if constexpr (kAnti)
+        linked = linked + Anti(l[i + 1]) * (up[1] - t[i]) + Anti(l[i + kCornerStride]) * (down[-1] - t[i]);
+      if constexpr (kMain || kAnti) flux += linked;
+      h[i] += dt_s * inverse_area[i] * flux - loss * t[i];
     }
   }
 }
 
 FULCRUM_WIDE
-void AnyStage(Tile* tile, float dt_s, float gain, float loss, float /*first*/) {
-  Stage<false, false, false>(tile, dt_s, gain, loss, 0);
-}
-FULCRUM_WIDE
-void LastStage(Tile* tile, float dt_s, float gain, float loss, float first) {
-  Stage<true, false, false>(tile, dt_s, gain, loss, first);
-}
-FULCRUM_WIDE
-void AnyStageWithFront(Tile* tile, float dt_s, float gain, float loss, float /*first*/) {
-  Stage<false, false, true>(tile, dt_s, gain, loss, 0);
-}
-FULCRUM_WIDE
-void LastStageWithFront(Tile* tile, float dt_s, float gain, float loss, float first) {
-  Stage<true, false, true>(tile, dt_s, gain, loss, first);
-}
-FULCRUM_WIDE
-void AnyStageSheared(Tile* tile, float dt_s, float gain, float loss, float /*first*/) {
-  Stage<false, true, false>(tile, dt_s, gain, loss, 0);
-}
-FULCRUM_WIDE
-void LastStageSheared(Tile* tile, float dt_s, float gain, float loss, float first) {
-  Stage<true, true, false>(tile, dt_s, gain, loss, first);
-}
-FULCRUM_WIDE
-void AnyStageShearedWithFront(Tile* tile, float dt_s, float gain, float loss, float /*first*/) {
-  Stage<false, true, true>(tile, dt_s, gain, loss, 0);
-}
-FULCRUM_WIDE
-void LastStageShearedWithFront(Tile* tile, float dt_s, float gain, float loss, float first) {
-  Stage<true, true, true>(tile, dt_s, gain, loss, first);
+void StageOfTile(Tile* tile, float dt_s, float gain, float loss) {
+  const bool main = tile->geometry.has_main, anti = tile->geometry.has_anti, sheared = main || anti;
+  if (!tile->smooth_s.empty()) {
+    sheared ? Stage<true, true, true>(tile, dt_s, gain, loss) : Stage<false, false, true>(tile, dt_s, gain, loss);
+  } else if (main) {
+    anti ? Stage<true, true, false>(tile, dt_s, gain, loss) : Stage<true, false, false>(tile, dt_s, gain, loss);
+  } else {
+    anti ? Stage<false, true, false>(tile, dt_s, gain, loss) : Stage<false, false, false>(tile, dt_s, gain, loss);
+  }
 }
 
-using StageKernel = void (*)(Tile*, float, float, float, float);
-/// By shear, fronts, last stage.
-constexpr StageKernel kStages[2][2][2] = {
-    {{AnyStage, LastStage}, {AnyStageWithFront, LastStageWithFront}},
-    {{AnyStageSheared, LastStageSheared}, {AnyStageShearedWithFront, LastStageShearedWithFront}}};
+/// Averages the enthalpy after the last stage with that before the step, whose weight is `first`; see DiffuseIsland.
+FULCRUM_WIDE
+void Average(float first, const float* __restrict before, float* __restrict h) {
+  for (int k = 0; k < kTileCells; ++k) h[k] += first * (before[k] - h[k]);
+}
 
 /// Computes theta, its column sums and extremes; rc = rc_dry + water * rc_water.
 FULCRUM_WIDE
@@ -203,9 +183,9 @@ void HeatField::ExchangeHalos(Tile* tile) {
 void HeatField::RunStage(Tile* tile, const StageOf& stage, Ledger* ledger) {
   const float loss = stage.sink ? stage.dt_s * SinkOf(*tile) : 0.0f;
   const float first = 1.0f / static_cast<float>(stage.count);
-  const bool sheared = !tile->links.empty(), front = !tile->smooth_s.empty();
   if (stage.index == 0) tile->before = tile->state.enthalpy;
-  kStages[sheared ? 1 : 0][front ? 1 : 0][stage.last() ? 1 : 0](tile, stage.dt_s, stage.gain, loss, first);
+  StageOfTile(tile, stage.dt_s, stage.gain, loss);
+  if (stage.last()) Average(first, tile->before.data(), tile->state.enthalpy.data());
   double sum = 0;
   for (const float s : tile->theta_sum) sum += s;
   ledger->lost += static_cast<double>(1.0f - first) * sum * loss * tile->flat_volume;

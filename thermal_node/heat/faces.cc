@@ -166,14 +166,20 @@ void LinksOf(Tile* tile, float scale) {
   for (int j = 0; j <= kTile; ++j) {
     const float* __restrict shear = &tile->geometry.shear[Corner(0, j)];
     float* __restrict link = &tile->links[Corner(0, j)];
+    alignas(64) float main[kTile + 1], anti[kTile + 1];
     for (int i = 0; i <= kTile; ++i) {
       const int at = ThetaIndex(i, j), above = at - kThetaStride;
-      const Half a = HalfAt(cells, above - 1), b = HalfAt(cells, above), c = HalfAt(cells, at - 1),
-                 d = HalfAt(cells, at);
-      const auto tissue = [](const Half& half) { return half.to_wetter < std::numeric_limits<float>::infinity(); };
-      const float main = tissue(b) || tissue(c) ? Conductance(a, d) : 0.0f;
-      const float anti = tissue(a) || tissue(d) ? Conductance(b, c) : 0.0f;
-      link[i] = scale * shear[i] * (shear[i] > 0.0f ? main : anti);
+      main[i] = Conductance(HalfAt(cells, above - 1), HalfAt(cells, at));
+      anti[i] = Conductance(HalfAt(cells, above), HalfAt(cells, at - 1));
+    }
+    // A loop of its own: in one the choices would become branches, which are not vectorised.
+    const float* __restrict wetter = &cells.to_wetter[ThetaIndex(0, j)];
+    for (int i = 0; i <= kTile; ++i) {
+      const float a = wetter[i - 1 - kThetaStride], b = wetter[i - kThetaStride], c = wetter[i - 1], d = wetter[i];
+      constexpr float kNoneThere = std::numeric_limits<float>::infinity();
+      const float across = (b < c ? b : c) < kNoneThere ? main[i] : 0.0f;
+      const float along = (a < d ? a : d) < kNoneThere ? anti[i] : 0.0f;
+      link[i] = scale * shear[i] * (shear[i] > 0.0f ? across : along);
     }
   }
 }
@@ -249,6 +255,8 @@ void SetGeometry(const Sheet& sheet, Tile* tile) {
   for (int j = 0; j <= kTile; ++j) {
     for (int i = 0; i <= kTile; ++i) geometry.shear[Corner(i, j)] = shear[(j + 1) * kSide + i + 1];
   }
+  geometry.has_main = std::any_of(geometry.shear.begin(), geometry.shear.end(), [](float b) { return b > 0.0f; });
+  geometry.has_anti = std::any_of(geometry.shear.begin(), geometry.shear.end(), [](float b) { return b < 0.0f; });
 }
 
 std::array<const Tile*, 9> HeatField::Around(const Tile& tile) const {

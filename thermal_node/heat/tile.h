@@ -58,6 +58,7 @@ struct TileGeometry {
   alignas(64) std::array<float, kTile * kFaceStride> across_s{};
   alignas(64) std::array<float, (kTile + 3) * kTile> across_t{};  ///< sqrt(g) g^tt at FaceT, likewise.
   std::vector<float> shear;                                       ///< sqrt(g) g^st at Corner; empty: none.
+  bool has_main = false, has_anti = false;                        ///< The shear has values above 0, below 0.
 };
 
 /// Thermal resistance from where a cell has its theta to its face, over cell_m [m K/W]; infinite where there is no
