@@ -1,7 +1,12 @@
 #include "thermal_node/coupling/patch.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstring>
+#include <vector>
+
+#include "thermal_node/heat/wide.h"
 
 namespace fulcrum::thermal {
 namespace {
@@ -13,52 +18,90 @@ std::uint8_t ToByte(float value) {
   return value > 0.0f ? static_cast<std::uint8_t>(std::min(value + 0.5f, 255.0f)) : std::uint8_t{0};
 }
 
-/// 0 wet, 128 dry, 255 char.
-std::uint8_t Dryness(float water, float charred) { return ToByte(128.0f * (1.0f - water) + 127.0f * charred); }
+/// ToByte, vectorised.
+[[gnu::always_inline]] inline std::uint32_t ByteOf(float value) {
+  const float rounded = (value > 0.0f ? value : 0.0f) + 0.5f;
+  return static_cast<std::uint32_t>(static_cast<std::int32_t>(rounded < 255.0f ? rounded : 255.0f));
+}
+
+/// Red, green, blue and alpha of a texel as they lie in memory.
+[[gnu::always_inline]] inline std::uint32_t Texel(std::uint32_t r, std::uint32_t g, std::uint32_t b, std::uint32_t a) {
+  static_assert(std::endian::native == std::endian::little);
+  return r | g << 8u | b << 16u | a << 24u;
+}
+
+/// A run of texels whose cells are neighbours in one tile.
+struct Run {
+  int x, count, tx, i;
+};
+
+/// Draws the cells of a run, `cell` the first one and `t` its theta. Returns the highest theta, at least 0.
+FULCRUM_WIDE
+float DrawCells(const TileState& state, const float* __restrict t, int cell, int count, float body,
+                std::uint32_t* __restrict out) {
+  const float* __restrict water = &state.water[cell];
+  const float* __restrict charred = &state.charred[cell];
+  const std::uint8_t* __restrict flags = &state.flags[cell];
+  alignas(64) float high[kTile] = {};
+  for (int n = 0; n < count; ++n) {
+    const std::uint32_t red = ByteOf((body + t[n] - kTexelZero_C) * kTexelPerKelvin);
+    // 0 wet, 128 dry, 255 char.
+    const std::uint32_t blue = ByteOf(128.0f * (1.0f - water[n]) + 127.0f * charred[n]);
+    out[n] = Texel(red, 0, blue, 255);
+  }
+  // A loop of its own: in one the choices would become branches, which are not vectorised.
+  for (int n = 0; n < count; ++n) {
+    const std::uint32_t flag = flags[n];
+    out[n] &= ((flag & kOutside) != 0 ? Texel(255, 255, 0, 255) : ~0u) &
+              ((flag & kRemoved) != 0 ? Texel(255, 255, 255, 0) : ~0u);
+  }
+  for (int n = 0; n < count; ++n) high[n] = high[n] > t[n] ? high[n] : t[n];
+  return *std::max_element(high, high + kTile);
+}
+
+/// Adds the browning of the collagen, which most cells have not.
+void AddBrown(const float* omega, int count, std::uint32_t* out) {
+  for (int n = 0; n < count; ++n) {
+    if (omega[n] > 0.0f) out[n] |= std::uint32_t{ToByte(255.0f * (1.0f - std::exp(-omega[n])))} << 8u;
+  }
+}
 
 }  // namespace
 
 float DrawPatch(const HeatField& field, float texel_m, const PatchPlace& place, std::span<std::uint8_t> texels) {
   const Sheet& sheet = field.sheet();
   const float body = field.material().body_C;
-  const std::array<std::uint8_t, 4> healthy{ToByte((body - kTexelZero_C) * kTexelPerKelvin), 0, 0, 255};
-  std::array<int, kPatchTexels> column;  // cell of each texel column
+  const std::uint32_t healthy = Texel(ToByte((body - kTexelZero_C) * kTexelPerKelvin), 0, 0, 255);
+  const auto cell_of = [&](std::uint32_t texel, std::int32_t origin) {
+    return static_cast<int>(std::floor((static_cast<float>(texel) + 0.5f) * texel_m / sheet.cell_m)) - origin;
+  };
+  std::vector<Run> runs;
+  runs.reserve(kPatchTexels);
   for (int x = 0; x < kPatchTexels; ++x) {
-    const float s = (static_cast<float>(place.origin_x + x) + 0.5f) * texel_m;
-    column[x] = static_cast<int>(std::floor(s / sheet.cell_m)) - sheet.origin_x;
+    const int ix = cell_of(place.origin_x + static_cast<std::uint32_t>(x), sheet.origin_x);
+    if (ix < 0) continue;
+    if (!runs.empty() && runs.back().x + runs.back().count == x && runs.back().tx == ix / kTile &&
+        runs.back().i + runs.back().count == ix % kTile) {
+      ++runs.back().count;
+    } else {
+      runs.push_back({x, 1, ix / kTile, ix % kTile});
+    }
   }
   float highest = 0;
+  std::array<std::uint32_t, kPatchTexels> row;
   for (int y = 0; y < kPatchTexels; ++y) {
-    const float t = (static_cast<float>(place.origin_y + y) + 0.5f) * texel_m;
-    const int iy = static_cast<int>(std::floor(t / sheet.cell_m)) - sheet.origin_y;
-    std::uint8_t* out = &texels[static_cast<std::size_t>(4) * kPatchTexels * y];
-    int tile_x = -1;
-    const Tile* tile = nullptr;
-    for (int x = 0; x < kPatchTexels; ++x, out += 4) {
-      const int ix = column[x];
-      if (ix < 0 || iy < 0) {
-        std::copy(healthy.begin(), healthy.end(), out);
-        continue;
-      }
-      if (ix / kTile != tile_x) {
-        tile_x = ix / kTile;
-        tile = field.Find(tile_x, iy / kTile);
-      }
-      if (tile == nullptr) {
-        std::copy(healthy.begin(), healthy.end(), out);
-        continue;
-      }
-      const int i = ix % kTile, j = iy % kTile, cell = j * kTile + i;
-      const float theta = tile->theta[ThetaIndex(i, j)];
-      const TileState& s = tile->state;
-      highest = std::max(highest, theta);
-      out[0] = ToByte((body + theta - kTexelZero_C) * kTexelPerKelvin);
-      const float omega = s.omega_collagen[cell];
-      out[1] = omega > 0.0f ? ToByte(255.0f * (1.0f - std::exp(-omega))) : 0;
-      const bool outside = (s.flags[cell] & kOutside) != 0;
-      out[2] = outside ? 0 : Dryness(s.water[cell], s.charred[cell]);
-      out[3] = (s.flags[cell] & kRemoved) != 0 ? 0 : 255;
+    const int iy = cell_of(place.origin_y + static_cast<std::uint32_t>(y), sheet.origin_y);
+    row.fill(healthy);
+    for (const Run& run : runs) {
+      const Tile* tile = iy < 0 ? nullptr : field.Find(run.tx, iy / kTile);
+      if (tile == nullptr) continue;
+      const int j = iy % kTile, cell = j * kTile + run.i;
+      std::uint32_t* out = &row[static_cast<std::size_t>(run.x)];
+      highest =
+          std::max(highest, DrawCells(tile->state, &tile->theta[ThetaIndex(run.i, j)], cell, run.count, body, out));
+      AddBrown(&tile->state.omega_collagen[cell], run.count, out);
     }
+    std::memcpy(&texels[sizeof(row) * static_cast<std::size_t>(y)], row.data(), sizeof(row));
   }
   return body + highest;
 }

@@ -256,7 +256,9 @@ void SourceWindow::DepositFar(HeatField* field, bool hold, Ledger* ledger) {
     const float r = std::max((centre - middle).norm(), 1.0f);
     return r >= reach ? 0.0f : far_tented_ ? 1.0f / (r * r) : far.DensityAt(r * cell);
   };
+  const int columns = tile_of(high.x()) - tile_of(low.x()) + 1, rows = tile_of(high.y()) - tile_of(low.y()) + 1;
   std::vector<Part> parts;
+  parts.reserve(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
   double cells = 0;  // of density
   for (int ty = tile_of(low.y()); ty <= tile_of(high.y()); ++ty) {
     for (int tx = tile_of(low.x()); tx <= tile_of(high.x()); ++tx) {

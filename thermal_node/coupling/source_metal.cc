@@ -13,15 +13,16 @@ namespace {
 /// between.
 constexpr float kFarApart = 2.0f;
 
-/// Decodes the gaps of the cells (x, y) to (x + kWindow - 1, y) [m].
-void DecodeRow(const Footprint& print, std::int32_t x, std::int32_t y, float* row) {
-  std::fill_n(row, kWindow, Footprint::Decode(kBeyond));
+/// Decodes the gaps of the cells (x, y) to (x + count - 1, y) [m].
+void DecodeRow(const Footprint& print, std::int32_t x, std::int32_t y, std::int32_t count, float* __restrict row) {
+  std::fill_n(row, count, Footprint::Decode(kBeyond));
   const std::int32_t j = y - print.y, width = static_cast<std::int32_t>(print.width);
   if (j < 0 || j >= static_cast<std::int32_t>(print.height())) return;
-  const std::int32_t first = std::max(x, print.x), last = std::min(x + kWindow, print.x + width);
-  for (std::int32_t cell = first; cell < last; ++cell) {
-    row[cell - x] = Footprint::Decode(print.gap[static_cast<std::size_t>(j * width + cell - print.x)]);
-  }
+  const std::int32_t first = std::max(x, print.x), last = std::min(x + count, print.x + width);
+  if (first >= last) return;
+  const std::uint8_t* __restrict gap = &print.gap[static_cast<std::size_t>(j * width + first - print.x)];
+  float* __restrict out = row + (first - x);
+  for (std::int32_t n = 0; n < last - first; ++n) out[n] = Footprint::Decode(gap[n]);
 }
 
 }  // namespace
@@ -58,14 +59,26 @@ void SourceWindow::AddFootprint(const TipPath& path, float at, float reach) {
   const std::int32_t left = corner_.ix + sheet_.origin_x, top = corner_.iy + sheet_.origin_y;
   constexpr auto kMargin = static_cast<int>(0.5f * kWindow - kMetalReach);
   const auto fits = [](int n) { return n >= kMargin && n < kWindow - kMargin; };
+  // Columns of the window that either footprint covers. Cells beyond both have no metal near them, unless the cells are
+  // so large that even the largest gap that a footprint tells is within reach.
+  std::int32_t i0 = 0, i1 = kWindow;
+  if (Footprint::Decode(kBeyond) * per_cell > 1.01f * reach) {
+    i0 = std::max(i0, std::min(a.x + back.ix, b.x - ahead.ix) - left);
+    i1 = std::min(i1, std::max(a.x + static_cast<std::int32_t>(a.width) + back.ix,
+                               b.x + static_cast<std::int32_t>(b.width) - ahead.ix) -
+                          left);
+  }
+  if (i0 >= i1) return;
   std::array<float, kWindow> first, last;
   for (std::int32_t y = std::max(y0, top); y < std::min(y1, top + kWindow); ++y) {
-    DecodeRow(a, left - back.ix, y - back.iy, first.data());
-    DecodeRow(b, left + ahead.ix, y + ahead.iy, last.data());
+    DecodeRow(a, left + i0 - back.ix, y - back.iy, i1 - i0, first.data());
+    DecodeRow(b, left + i0 + ahead.ix, y + ahead.iy, i1 - i0, last.data());
+    for (std::size_t n = 0; n < static_cast<std::size_t>(i1 - i0); ++n) {
+      first[n] = ((1 - u) * first[n] + u * last[n]) * per_cell;
+    }
     const int j = y - top;
-    for (int i = 0; i < kWindow; ++i) {
-      const auto n = static_cast<std::size_t>(i);
-      const float gap = ((1 - u) * first[n] + u * last[n]) * per_cell;
+    for (int i = i0; i < i1; ++i) {
+      const float gap = first[static_cast<std::size_t>(i - i0)];
       if (!(gap < reach)) continue;
       if (fits(i) && fits(j)) {
         AddGap(i, j, gap);

@@ -281,19 +281,21 @@ void SourceWindow::BoilRow(int j, float remove_theta, Ledger* ledger) {
   float* __restrict h = &enthalpy_[j * kWindow];
   float* __restrict w = &water_[j * kWindow];
   const float* __restrict tissue = &tissue_[j * kWindow];
-  alignas(64) float before[kWindow];
+  alignas(64) float before[kWindow], after[kWindow], boiled[kWindow];
+  // Evaluated for every cell, with 0 where nothing boils, and the choices in loops of their own: a branch would prevent
+  // vectorisation.
+  for (int i = 0; i < kWindow; ++i) {
+    const float water = w[i], excess = h[i] - (rc_dry + water * rc_water) * boil;
+    const float some = (excess > 0.0f ? excess : 0.0f) / latent, there = tissue[i] > 0.0f ? water : 0.0f;
+    boiled[i] = some < there ? some : there;
+    w[i] = water - boiled[i];
+    before[i] = h[i];
+    after[i] = (rc_dry + w[i] * rc_water) * boil + (excess - boiled[i] * latent);
+  }
+  for (int i = 0; i < kWindow; ++i) h[i] = boiled[i] > 0.0f ? after[i] : before[i];
   std::uint32_t removable = 0;
   for (int i = 0; i < kWindow; ++i) {
-    const float enthalpy = h[i], water = w[i];
-    const float excess = enthalpy - (rc_dry + water * rc_water) * boil;
-    // Evaluated for every cell, with 0 where nothing boils: a branch would prevent vectorisation.
-    const float some = (excess > 0.0f ? excess : 0.0f) / latent, there = tissue[i] > 0.0f ? water : 0.0f;
-    const float boiled = some < there ? some : there, left = water - boiled;
-    const float after = (rc_dry + left * rc_water) * boil + (excess - boiled * latent);
-    before[i] = enthalpy;
-    h[i] = boiled > 0.0f ? after : enthalpy;
-    w[i] = left;
-    const float dry = left > 0.0f ? 0.0f : h[i], hot = tissue[i] > 0.0f ? dry : 0.0f;
+    const float dry = w[i] > 0.0f ? 0.0f : h[i], hot = tissue[i] > 0.0f ? dry : 0.0f;
     removable |= hot >= too_hot ? 1u : 0u;
   }
   double steam = 0;
