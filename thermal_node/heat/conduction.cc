@@ -25,8 +25,9 @@ namespace {
 /// two-point flux, so it remains a conductance times the difference of the two cells: the maximum principle holds,
 /// closed faces stay closed, and both cells of the face get the same flux.
 [[gnu::always_inline]] inline float Limited(float f, float flux, float gain) {
-  const float most = gain * flux;
-  const float low = most < 0.0f ? most : 0.0f, high = most > 0.0f ? most : 0.0f;
+  // Not a literal: the compiler would take two operations for a maximum with 0.
+  const float most = gain * flux, zero = gain - gain;
+  const float low = most < zero ? most : zero, high = most > zero ? most : zero;
   const float above = f > low ? f : low;
   return above < high ? above : high;
 }
@@ -82,11 +83,15 @@ template <bool kMain, bool kAnti, bool kFront>
       float flux = (fs[i] - fs[i + 1]) + (ft[i] - ft[i + kTile]);
       const float* up = &t[i - kThetaStride];
       const float* down = &t[i + kThetaStride];
-      float linked = 0;
-      if constexpr (kMain) linked = Main(l[i]) * (up[-1] - t[i]) + Main(l[i + kCornerStride + 1]) * (down[1] - t[i]);
-      if constexpr (kAnti)
-        linked = linked + Anti(l[i + 1]) * (up[1] - t[i]) + Anti(l[i + kCornerStride]) * (down[-1] - t[i]);
-      if constexpr (kMain || kAnti) flux += linked;
+      // With links along one diagonal only, all have the sign of that diagonal.
+      if constexpr (kMain && kAnti) {
+        flux += Main(l[i]) * (up[-1] - t[i]) + Main(l[i + kCornerStride + 1]) * (down[1] - t[i]) +
+                Anti(l[i + 1]) * (up[1] - t[i]) + Anti(l[i + kCornerStride]) * (down[-1] - t[i]);
+      } else if constexpr (kMain) {
+        flux += l[i] * (up[-1] - t[i]) + l[i + kCornerStride + 1] * (down[1] - t[i]);
+      } else if constexpr (kAnti) {
+        flux += l[i + 1] * (t[i] - up[1]) + l[i + kCornerStride] * (t[i] - down[-1]);
+      }
       h[i] += dt_s * inverse_area[i] * flux - loss * t[i];
     }
   }

@@ -101,6 +101,16 @@ void RowHeat(const Fine& fine, const Field& voltage, const Field& sigma, float f
   }
 }
 
+/// Sum of the lanes: the second half is added to the first one until one is left.
+template <int kWidth>
+[[gnu::always_inline]] inline float Folded(float* lane) {
+  if constexpr (kWidth > 1) {
+    for (int l = 0; l < kWidth / 2; ++l) lane[l] += lane[l + kWidth / 2];
+    return Folded<kWidth / 2>(lane);
+  }
+  return lane[0];
+}
+
 /// Power into the sheet, heat in it, power lost at the contact and power into ground, at 1 V [W/V^2].
 struct Balance {
   double in = 0, heat = 0, lost = 0, grounded = 0;
@@ -118,18 +128,10 @@ void AddRow(const float* __restrict contact, const float* __restrict lost, const
       grounded[l] += ground[i + l] * v[i + l] * v[i + l];
     }
   }
-  for (int width = kLanes / 2; width > 0; width /= 2) {
-    for (int l = 0; l < width; ++l) {
-      in[l] += in[l + width];
-      heat[l] += heat[l + width];
-      lost_lane[l] += lost_lane[l + width];
-      grounded[l] += grounded[l + width];
-    }
-  }
-  balance->in += in[0];
-  balance->heat += heat[0];
-  balance->lost += lost_lane[0];
-  balance->grounded += grounded[0];
+  balance->in += Folded<kLanes>(in);
+  balance->heat += Folded<kLanes>(heat);
+  balance->lost += Folded<kLanes>(lost_lane);
+  balance->grounded += Folded<kLanes>(grounded);
 }
 
 }  // namespace
