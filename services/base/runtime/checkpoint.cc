@@ -21,7 +21,7 @@
 namespace fulcrum::runtime {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x31304b50434c5546ull;  // "FULCPK01" in memory order.
+constexpr std::uint64_t kMagic = 0x32304b50434c5546ull;  // "FULCPK02" in memory order.
 constexpr std::size_t kPage = 4096;
 
 /// First page of the file: identifies the scene and layout of the two slots.
@@ -54,7 +54,7 @@ std::size_t SlotStride(std::size_t capacity) { return kPage + RoundUpToPage(capa
 std::uint64_t Checksum(std::uint64_t sequence, std::span<const std::byte> payload) {
   Hash64 hash;
   hash.AddValue(sequence);
-  hash.Add(payload);
+  hash.AddLong(payload);
   return hash.value();
 }
 
