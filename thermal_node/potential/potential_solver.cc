@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <span>
 
 #include "thermal_node/heat/wide.h"
 #include "thermal_node/potential/multigrid.h"
@@ -61,6 +62,11 @@ void Add(float f, const Field& x, Field* y) {
   const float* __restrict px = x.data();
   float* __restrict py = y->data();
   for (int k = 0; k < static_cast<int>(x.size()); ++k) py[k] += f * px[k];
+}
+
+FULCRUM_WIDE
+void Scale(float f, std::span<float> x) {
+  for (float& value : x) value *= f;
 }
 
 /// Face conductances of the finest level. The halo of sigma is 0, which closes the window's border; the current that
@@ -227,8 +233,8 @@ PotentialResult PotentialSolver::Evaluate(const PotentialProblem& problem) {
   result.imbalance = static_cast<float>(std::abs(in - out) / in);
   result.scale = in / out;
   const auto scale = static_cast<float>(result.scale);
-  for (float& q : heat_) q *= scale;
-  for (float& q : row_heat_) q *= scale;
+  Scale(scale, heat_);
+  Scale(scale, row_heat_);
   result.heat_S = heat * static_cast<double>(scale);
   result.lost_S = lost * static_cast<double>(scale);
   return result;

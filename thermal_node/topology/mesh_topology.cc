@@ -201,10 +201,12 @@ void MeshTopology::StageShrink(const HeatField& field, const Tile& tile) {
     const Vec2f a = node_[edge / 3], b = node_[OtherEnd(edge)];
     const int samples = std::max(2, static_cast<int>(std::ceil((b - a).norm())));
     float sum = 0;
+    const Tile* at = &tile;
+    int tx = tile.tx, ty = tile.ty;
     for (int n = 0; n < samples; ++n) {
       const Vec2f p = a + (b - a) * ((static_cast<float>(n) + 0.5f) / static_cast<float>(samples));
       const int ix = CellCoordinate(p.x(), sheet.nx), iy = CellCoordinate(p.y(), sheet.ny);
-      const Tile* at = field.Find(ix / kTile, iy / kTile);
+      if (ix / kTile != tx || iy / kTile != ty) at = field.Find(tx = ix / kTile, ty = iy / kTile);
       const float omega = at != nullptr ? at->state.omega_collagen[(iy % kTile) * kTile + ix % kTile] : 0.0f;
       if (omega > 0.0f) sum += 1.0f - std::exp(-omega);  // false for NaN, which must stay within its cell
     }
