@@ -279,6 +279,42 @@ TEST(HeatTest, TilesThatTouchAtACornerOnlyAreTwoIslands) {
   EXPECT_NEAR(second->Heat(), heat_of_second, 1e-6 * heat_of_second);
 }
 
+TEST(HeatTest, LinksOfOneSignGiveTheBitsOfTheGeneralKernel) {
+  for (const float shear : {-0.4f, 0.4f, 0.0f}) {
+    Sheet sheet = MakeFlatSheet(9.6e-3f, 9.6e-3f, 1e-4f);
+    SetMetric(&sheet, [&](const Vec2f& at) {
+      return shear != 0.0f ? SurfaceMetric{1.0f, shear, 1.0f} : SurfaceMetric{1.0f, 60.0f * (at.x() - 5e-3f), 1.0f};
+    });
+    HeatField fast(sheet, MakeMaterial(ThermalParams{})), general(sheet, MakeMaterial(ThermalParams{}));
+    for (HeatField* field : {&fast, &general}) {
+      std::mt19937 random(3);
+      std::uniform_real_distribution<float> uniform(0, 1);
+      Fill(field, [&](double, double) { return uniform(random) < 0.3f ? 55.0 : 0.0; });
+      double removed = 0;
+      for (Tile* tile : field->awake()) {
+        for (int k = 0; k < kTileCells; ++k) {
+          if (uniform(random) < 0.1f) field->TakeOut(tile, k, kRemoved, &removed);
+        }
+      }
+    }
+    // The first metric's links lie along one diagonal, its opposite's along the other, the last one's along both.
+    for (const Tile* tile : fast.awake()) {
+      EXPECT_EQ(tile->geometry.has_main && tile->geometry.has_anti, shear == 0.0f && tile->tx == 1);
+      EXPECT_TRUE(tile->geometry.has_main || tile->geometry.has_anti);
+    }
+    for (Tile* tile : general.awake()) tile->geometry.has_main = tile->geometry.has_anti = true;
+    Ledger a, b;
+    for (int n = 0; n < 20; ++n) {
+      fast.Diffuse(0.01f, &a);
+      general.Diffuse(0.01f, &b);
+    }
+    EXPECT_EQ(a.lost, b.lost);
+    for (std::size_t n = 0; n < fast.awake().size(); ++n) {
+      EXPECT_EQ(fast.awake()[n]->state.enthalpy, general.awake()[n]->state.enthalpy);
+    }
+  }
+}
+
 TEST(HeatTest, BadCellIsQuarantinedAndItsNeighboursAreNot) {
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1e30f}) {
     HeatField field(MakeFlatSheet(9.6e-3f, 9.6e-3f, 1e-4f), MakeMaterial(ThermalParams{}));

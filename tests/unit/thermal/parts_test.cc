@@ -423,6 +423,53 @@ TEST(PatchTest, ShowsTemperatureDamageAndHolesInPlace) {
   EXPECT_GT(brown, 1);
 }
 
+TEST(PatchTest, EachTexelIsThatOfItsCell) {
+  // Texels of half a cell, of a cell and of two, over tiles of which one is missing, with cells of every kind.
+  HeatField field(MakeFlatSheet(9.6e-3f, 9.6e-3f, 1e-4f), MakeMaterial(ThermalParams{}));
+  Ledger ledger;
+  std::uint32_t number = 1;
+  for (const auto& [tx, ty] : {std::pair{0, 0}, {1, 1}, {2, 1}}) {
+    Tile* tile = field.Wake(tx, ty);
+    for (int k = 0; k < kTileCells; ++k) {
+      number = number * 1664525u + 1013904223u;
+      const float part = static_cast<float>(number >> 8u) / 16777216.0f;
+      TileState& s = tile->state;
+      s.water[k] = 1.0f - part;
+      s.enthalpy[k] = (240.0f * part - 60.0f) * field.material().HeatCapacity(s.water[k]);
+      s.charred[k] = number % 3 == 0 ? part : 0.0f;
+      s.omega_collagen[k] = number % 4 == 0 ? 3.0f * part : number % 4 == 1 ? NAN : 0.0f;
+      s.flags[k] = static_cast<std::uint8_t>(number % 7 == 0 ? kRemoved : number % 7 == 1 ? kOutside : 0);
+    }
+    field.RefreshTheta(tile, &ledger);
+  }
+  const auto byte = [](float value) { return value > 0.0f ? static_cast<int>(std::min(value + 0.5f, 255.0f)) : 0; };
+  const float body = field.material().body_C;
+  for (const float texel_m : {5e-5f, 1e-4f, 2e-4f}) {
+    std::vector<std::uint8_t> texels(4 * kPatchTexels * kPatchTexels);
+    const float highest = DrawPatch(field, texel_m, {0, 0, 0}, texels);
+    float warmest = 0;
+    for (int n = 0; n < kPatchTexels * kPatchTexels; ++n) {
+      const auto cell_of = [&](int texel, int origin) {
+        return static_cast<int>(std::floor((static_cast<float>(texel) + 0.5f) * texel_m / 1e-4f)) - origin;
+      };
+      const int ix = cell_of(n % kPatchTexels, field.sheet().origin_x);
+      const int iy = cell_of(n / kPatchTexels, field.sheet().origin_y);
+      const Tile* tile = ix < 0 || iy < 0 ? nullptr : field.Find(ix / kTile, iy / kTile);
+      std::array<int, 4> expected{byte(2 * (body - 20)), 0, 0, 255};
+      if (tile != nullptr) {
+        const int k = iy % kTile * kTile + ix % kTile, flags = tile->state.flags[k];
+        const float theta = tile->theta[ThetaIndex(ix % kTile, iy % kTile)], omega = tile->state.omega_collagen[k];
+        warmest = std::max(warmest, theta);
+        expected = {byte((body + theta - 20) * 2), omega > 0.0f ? byte(255 * (1 - std::exp(-omega))) : 0,
+                    (flags & kOutside) != 0 ? 0 : byte(128 * (1 - tile->state.water[k]) + 127 * tile->state.charred[k]),
+                    (flags & kRemoved) != 0 ? 0 : 255};
+      }
+      for (std::size_t c = 0; c < 4; ++c) ASSERT_EQ(texels[4 * static_cast<std::size_t>(n) + c], expected[c]) << n;
+    }
+    EXPECT_EQ(highest, body + warmest);
+  }
+}
+
 TEST(PatchTest, PlannerSendsWhatChangedOnceAndOnlyThat) {
   const scene::SceneData data = FlatScene(61, 61, 1e-3f);
   const SceneView scene = data.View();
