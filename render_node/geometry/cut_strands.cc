@@ -166,7 +166,7 @@ void CutStrands::Append(const MembraneMesh& mesh, const Vec3f& eye_W, float pixe
     const float lean = 2 * UniformOf(strand.hash, 7) - 1;
     std::array<Vec3f, kStrandPoints> points;
     std::array<float, kStrandPoints> half;
-    if (stretch <= strand.breaks_at) {
+    if (stretch <= strand.breaks_at && gap <= kLongestSpan_m) {
       // A shallow arc of length L over a chord d sags by sqrt(3 / 8 d (L - d)).
       const float slack = std::max(0.0f, strand.length_m - gap);
       const float sag = std::min(std::sqrt(0.375f * gap * slack), kMostSag * strand.length_m);
@@ -183,7 +183,7 @@ void CutStrands::Append(const MembraneMesh& mesh, const Vec3f& eye_W, float pixe
       continue;
     }
     // Each end curls back, the shorter the farther the lips are apart.
-    const float beyond = stretch / strand.breaks_at - 1;
+    const float beyond = std::max(0.0f, stretch / strand.breaks_at - 1);
     const float length = strand.length_m * (0.14f + 0.18f * UniformOf(strand.hash, 8)) / (1 + 0.8f * beyond);
     const float turn = (1.2f + 1.8f * UniformOf(strand.hash, 9)) * std::min(1.0f, 0.5f + beyond);
     constexpr std::size_t kHalf = kStrandPoints / 2;

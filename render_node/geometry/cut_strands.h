@@ -15,6 +15,8 @@ namespace fulcrum::render {
 inline constexpr float kStrandsPerMetre = 3200;
 /// Stretch at which the weakest and the strongest break.
 inline constexpr float kWeakestStrand = 1.2f, kStrongestStrand = 2.2f;
+/// Longest gap that a strand spans [m]: one across a slit that is held wide open looks like a suture.
+inline constexpr float kLongestSpan_m = 0.005f;
 
 class CutStrands {
  public:

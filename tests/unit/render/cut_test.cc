@@ -251,6 +251,12 @@ TEST_F(CutTest, AStrandBreaksAtItsStretch) {
       EXPECT_LE(strand.breaks_at, kStrongestStrand);
     }
   }
+  // Across a slit that is held open wide nothing is spanned, however little it is stretched.
+  Open(kLongestSpan_m + 0.001f);
+  CutGeometry wide;
+  strands.Append(mesh_, eye_W_, kPixelsPerRad, &wide);
+  EXPECT_FALSE(wide.triangles.empty());
+  for (const Vec3f& p : wide.positions) EXPECT_GT(std::abs(p.x() - Middle() - 0.003f), 0.0005f);
   Open(0.030f);
   EXPECT_EQ(intact(), 0);
   // What is left of each stays near its lip: nothing spans the slit.
