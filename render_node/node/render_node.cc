@@ -116,7 +116,8 @@ bool RenderNode::DrawInto(Bitmap* picture) {
 
 void RenderNode::DrawFrom(const RenderParams& camera, Bitmap* picture) {
   (void)view_.UpdateEffects(session_time_s_);
-  view_.SetSmoothed(false);  // A data set depends on no earlier picture.
+  view_.SetSmoothed(false);     // A data set depends on no earlier picture.
+  view_.SetSmoothEdges(false);  // Its masks have edges between pixels.
   view_.SetCamera(camera);
   view_.SetScale(quality_.scale());
   view_.SetTexts({});
@@ -374,6 +375,7 @@ void RenderNode::Draw(double session_time_s, bool write_png, ReadBack read) {
   // one of; a GPU draws many samples a pixel.
   view_.SetSmoothed(smooths_ && (window_ || streams_) &&
                     shape_.width * shape_.height <= LaparoscopeView::kMostSmoothed);
+  view_.SetSmoothEdges(true);
   view_.Update();
   const bool settles = view_.DrawsBackgroundAtRest();
   UpdateTexts();

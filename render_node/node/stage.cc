@@ -29,9 +29,11 @@ void WarmUp(const SceneView& scene, Stage* stage) {
   view.SetTexts(HudTexts(hud, scene.render.hud != 0));
   view.AddSmoke(Vec2f::Zero(), -10);
   static_cast<void>(view.UpdateEffects(-9.9));
+  view.SetSmoothEdges(true);
   // Few pixels are enough to compile the shaders, and a session waits for a restarted node.
   constexpr float kFewPixels = 0.25f;
   view.SetScale(kFewPixels);
+  view.Update();
   Bitmap picture;
   view.RehearseBurn(true);
   stage->display->DrawAndRead(&picture);

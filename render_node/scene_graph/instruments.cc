@@ -20,6 +20,18 @@ osg::ref_ptr<osg::Geometry> ToGeometry(const Solid& solid, const char* name) {
   return mesh.geometry();
 }
 
+std::shared_ptr<const MeshEdges> EdgesOf(const Solid& solid) {
+  return std::make_shared<MeshEdges>(solid.positions, solid.triangles);
+}
+
+Eigen::Matrix4f FromOsg(const osg::Matrix& m) {
+  Eigen::Matrix4f out;
+  for (int row = 0; row < 4; ++row) {
+    for (int col = 0; col < 4; ++col) out(row, col) = static_cast<float>(m(col, row));  // OSG multiplies row vectors.
+  }
+  return out;
+}
+
 constexpr const char* kToolName = "tool ";
 
 }  // namespace
@@ -49,17 +61,17 @@ Instruments::Instruments(const SceneView& scene) : root_(new osg::Group) {
 
 void Instruments::Build(const ToolDescription& tool, Instrument* instrument) {
   const ToolShape shape{tool.shaft_radius_m, tool.shaft_length_m, tool.tip_radius_m, tool.tip_length_m};
-  if (tool.kind == ToolKind::kHook) {
-    instrument->body->addChild(ToGeometry(Hook(shape), "hook"));
-    return;
-  }
-  if (tool.kind == ToolKind::kSuction) {
-    instrument->body->addChild(ToGeometry(SuctionTube(shape), "tube"));
-    return;
-  }
-  instrument->body->addChild(ToGeometry(GrasperShaft(shape), "grasper"));
-  const osg::ref_ptr<osg::Geometry> jaw = tool.kind == ToolKind::kScissors ? ToGeometry(ScissorBlade(shape), "blade")
-                                                                           : ToGeometry(GrasperJaw(shape), "jaw");
+  const auto set_body = [instrument](const Solid& solid, const char* name) {
+    instrument->body->addChild(ToGeometry(solid, name));
+    instrument->body_edges = EdgesOf(solid);
+  };
+  if (tool.kind == ToolKind::kHook) return set_body(Hook(shape), "hook");
+  if (tool.kind == ToolKind::kSuction) return set_body(SuctionTube(shape), "tube");
+  set_body(GrasperShaft(shape), "grasper");
+  const bool scissors = tool.kind == ToolKind::kScissors;
+  const Solid half = scissors ? ScissorBlade(shape) : GrasperJaw(shape);
+  const osg::ref_ptr<osg::Geometry> jaw = ToGeometry(half, scissors ? "blade" : "jaw");
+  instrument->jaw_edges.fill(EdgesOf(half));
   const osg::Matrix to_hinge = osg::Matrix::translate(0, 0, -tool.tip_length_m);
   instrument->closed = {to_hinge, osg::Matrix::rotate(std::numbers::pi, osg::Vec3(0, 0, 1)) * to_hinge};
   for (auto& joint : instrument->jaws) {
@@ -74,12 +86,16 @@ void Instruments::BuildFromMeshes(const SceneView& scene, std::uint32_t tool, In
     if (mesh.tool != tool) {
       continue;
     }
-    const auto geometry = ToGeometry(InstrumentSolid(scene, mesh), "instrument");
+    const Solid solid = InstrumentSolid(scene, mesh);
+    const auto geometry = ToGeometry(solid, "instrument");
     if (mesh.part == ToolPart::kBody) {
       instrument->body->addChild(geometry);
+      instrument->body_edges = EdgesOf(solid);
       continue;
     }
-    auto& joint = instrument->jaws[mesh.part == ToolPart::kJawPlus ? 0 : 1];
+    const std::size_t side = mesh.part == ToolPart::kJawPlus ? 0 : 1;
+    instrument->jaw_edges.at(side) = EdgesOf(solid);
+    auto& joint = instrument->jaws.at(side);
     joint = new osg::MatrixTransform;
     joint->addChild(geometry);
     instrument->body->addChild(joint);
@@ -103,6 +119,19 @@ void Instruments::SetJaw(int tool, float angle_rad) {
       const double turn = (k == 0 ? 0.5 : -0.5) * angle_rad;
       instrument.jaws[k]->setMatrix(instrument.closed[k] * osg::Matrix::inverse(from_hinge) *
                                     osg::Matrix::rotate(turn, osg::Vec3(0, 1, 0)) * from_hinge);
+    }
+  }
+}
+
+void Instruments::AppendEdges(const Laparoscope& eye, const Vec2f& size, std::vector<EdgeLine>* lines) const {
+  for (const Instrument& instrument : instruments_) {
+    if (instrument.body->getNodeMask() == 0) continue;
+    const Eigen::Matrix4f to_camera = eye.view * FromOsg(instrument.body->getMatrix());
+    if (instrument.body_edges) AppendOutline(*instrument.body_edges, to_camera, eye.projection, size, lines);
+    for (std::size_t k = 0; k < 2; ++k) {
+      if (!instrument.jaw_edges.at(k)) continue;
+      const Eigen::Matrix4f jaw = FromOsg(instrument.jaws.at(k)->getMatrix());
+      AppendOutline(*instrument.jaw_edges.at(k), to_camera * jaw, eye.projection, size, lines);
     }
   }
 }

@@ -3,10 +3,14 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <osg/Group>
 #include <osg/MatrixTransform>
 #include <string>
+#include <vector>
 
+#include "render_node/geometry/laparoscope.h"
+#include "render_node/geometry/outline.h"
 #include "services/base/core/scene_view.h"
 
 namespace fulcrum::render {
@@ -21,6 +25,9 @@ class Instruments {
   /// Sets position and orientation in frame W; a tool of kind kNone is not drawn.
   void SetPose(int tool, const ToolSample& sample);
   void SetJaw(int tool, float angle_rad);
+  /// Appends the edges of the instruments that are there (AppendOutline), as `eye` sees them in a picture of `size`
+  /// [pixels].
+  void AppendEdges(const Laparoscope& eye, const Vec2f& size, std::vector<EdgeLine>* lines) const;
   [[nodiscard]] osg::Group* node() const { return root_; }
 
  private:
@@ -30,6 +37,8 @@ class Instruments {
     // Transformation of a closed jaw from its own frame to frame T.
     std::array<osg::Matrix, 2> closed;
     float hinge_m = 0;
+    std::shared_ptr<const MeshEdges> body_edges;
+    std::array<std::shared_ptr<const MeshEdges>, 2> jaw_edges;
   };
   static void Build(const ToolDescription& tool, Instrument* instrument);
   static void BuildFromMeshes(const SceneView& scene, std::uint32_t tool, Instrument* instrument);

@@ -79,6 +79,7 @@ struct LaparoscopeView::Impl {
   Mesh shadow_mesh{"shadow", true};
   std::array<ToolSample, kMaxTools> tools{};
   bool tools_moved = true;
+  bool smooths_edges = false;
   std::array<TubeFlow, kMaxTools> flows{};
   Smoke smoke;
   float haze = 0;        // As drawn.
@@ -133,7 +134,7 @@ LaparoscopeView::Impl::Impl(const SceneView& view, const Look& given)
   BindTextures();
 
   Blend(overlay.state());
-  overlay.state()->setRenderBinDetails(1, "RenderBin");
+  overlay.state()->setRenderBinDetails(2, "RenderBin");
   const osg::ref_ptr<osg::Geode> text = new osg::Geode;
   text->addDrawable(overlay.geometry());
   root->addChild(optics.node());
@@ -316,6 +317,16 @@ void LaparoscopeView::SetMostScale(float most) { impl_->optics.SetMostScale(most
 
 void LaparoscopeView::SetSmoothed(bool on) { impl_->optics.SetSmoothed(on); }
 
+void LaparoscopeView::SetSmoothEdges(bool on) {
+  if (on == impl_->smooths_edges) return;
+  impl_->smooths_edges = on;
+  if (!on) return impl_->optics.SetEdges({});
+  impl_->optics.SetEdges(
+      [instruments = &impl_->instruments](const Laparoscope& eye, const Vec2f& size, std::vector<EdgeLine>* lines) {
+        instruments->AppendEdges(eye, size, lines);
+      });
+}
+
 bool LaparoscopeView::Refine() { return impl_->optics.Refine(); }
 
 bool LaparoscopeView::DrawsBackgroundAtRest() const { return impl_->optics.DrawsBackgroundAtRest(); }
@@ -329,6 +340,7 @@ void LaparoscopeView::Update() {
   if (impl_->tools_moved) {
     impl_->CastShadows();
   }
+  impl_->optics.UpdateEdges();
 }
 
 void LaparoscopeView::SetTexts(std::span<const OverlayText> texts) { impl_->overlay.Set(texts); }

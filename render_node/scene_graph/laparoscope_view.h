@@ -72,6 +72,10 @@ class LaparoscopeView {
   /// rasteriser, scales up to 1, and pictures of at most kMostSmoothed pixels: its time and memory grow with them.
   static constexpr int kMostSmoothed = 1280 * 720;
   void SetSmoothed(bool on);
+  /// Smooths the edges of instruments and the rim of the round field (scene_graph/edge_lines.h) in each picture,
+  /// whatever moves: at scales up to 1, through a clear lens, and not where the mean of several pictures is shown. Off
+  /// at first.
+  void SetSmoothEdges(bool on);
   /// Makes the next picture smoother while nothing changes; false if it would be the same as the last one.
   bool Refine();
   /// The next picture draws a background for the smoothing though the camera rests, which ends after a period.

@@ -16,7 +16,7 @@
 namespace fulcrum::render {
 namespace {
 
-constexpr unsigned kPictureUnit = 6;  // A texture unit that no other shader uses.
+constexpr unsigned kPictureUnit = 6, kDepthUnit = 9;  // Texture units that no other shader uses.
 constexpr Index kSides = 128;
 
 osg::Matrix ToOsg(const Eigen::Matrix4f& m) {
@@ -107,6 +107,8 @@ Optics::Optics(StereoLayout layout, std::span<const Laparoscope> eyes, int width
       soil_(new osg::Uniform("soil", 0.0f)),
       haze_(new osg::Uniform("haze", 0.0f)),
       smoke_(new osg::Uniform("smoke", osg::Vec3())),
+      eye_pixels_(new osg::Uniform("eye_pixels", osg::Vec2())),
+      reach_(new osg::Uniform("reach", 1.0f)),
       clear_lens_(MakeProgram("field.vert", "field.frag")),
       smooth_lens_(MakeProgram("field.vert", "smooth.frag")),
       soiled_lens_(MakeProgram("field.vert", "soiled.frag")) {
@@ -126,7 +128,7 @@ void Optics::AddEye(osg::Node* scene) {
   eye.scene.camera->setClearMask(0);
   eye.scene.camera->getOrCreateStateSet()->addUniform(eye.light_position);
   KeepBackgrounds(2, &eye);
-  eye.field = AddField(eye.scene.colour);
+  AddField(&eye);
   eyes_.push_back(eye);
 }
 
@@ -229,7 +231,7 @@ Optics::Target Optics::MakeTarget(int order, osg::Node* content) {
   return target;
 }
 
-osg::ref_ptr<osg::StateSet> Optics::AddField(osg::Texture2D* scene) {
+void Optics::AddField(Eye* eye) {
   // Clip coordinates of an eye's part: its centre and half its size, and the direction of the other eye's.
   osg::Vec4 part(0, 0, 1, 1);
   osg::Vec2 border;
@@ -242,17 +244,20 @@ osg::ref_ptr<osg::StateSet> Optics::AddField(osg::Texture2D* scene) {
     border.set(0, -side);
   }
   Mesh field("field", false);
-  const osg::ref_ptr<osg::StateSet> state = field.state();
+  const osg::ref_ptr<osg::Geode> geode = new osg::Geode;
+  node_->addChild(geode);
+  osg::StateSet* state = geode->getOrCreateStateSet();
   for (osg::Uniform* uniform :
        {new osg::Uniform("scene_picture", static_cast<int>(kPictureUnit)), new osg::Uniform("part", part),
         new osg::Uniform("border", border), texture_scale_.get(), texture_most_.get(), pixel_.get(), soil_.get(),
-        haze_.get(), smoke_.get()}) {
+        haze_.get(), smoke_.get(), eye_pixels_.get(), reach_.get(),
+        new osg::Uniform("scene_depth", static_cast<int>(kDepthUnit))}) {
     state->addUniform(uniform);
   }
-  state->setTextureAttribute(kPictureUnit, scene);
+  state->setTextureAttribute(kPictureUnit, eye->scene.colour);
   if (layout_ != StereoLayout::kNone) state->setMode(GL_CLIP_PLANE0, osg::StateAttribute::ON);
   state->setMode(GL_DEPTH_TEST, osg::StateAttribute::OFF);
-  state->setRenderBinDetails(0, "RenderBin");
+  field.state()->setRenderBinDetails(0, "RenderBin");
   std::vector<Vec3f> positions{Vec3f::Zero()};
   std::vector<Triangle> triangles;
   for (Index k = 0; k < kSides; ++k) {
@@ -262,10 +267,14 @@ osg::ref_ptr<osg::StateSet> Optics::AddField(osg::Texture2D* scene) {
   }
   field.SetPositions(positions);
   field.SetTriangles(triangles);
-  const osg::ref_ptr<osg::Geode> geode = new osg::Geode;
   geode->addDrawable(field.geometry());
-  node_->addChild(geode);
-  return state;
+  eye->field = field.state();
+  eye->edge_lines = std::make_shared<EdgeLines>();
+  eye->edge_lines->state()->setTextureAttribute(kDepthUnit, eye->scene.depth);
+  eye->edges = new osg::Geode;
+  eye->edges->setStateSet(state);
+  eye->edges->addDrawable(eye->edge_lines->geometry());
+  node_->addChild(eye->edges);
 }
 
 void Optics::SetScale(float scale) {
@@ -298,6 +307,8 @@ void Optics::UseScale() {
   texture_scale_->set(used);
   // Texels beyond this hold an older picture of another resolution.
   texture_most_->set(used - texel * 0.5f);
+  eye_pixels_->set(osg::Vec2(static_cast<float>(width_), static_cast<float>(height_)));
+  reach_->set(EdgeLines::kReach / share.y());
   pixel_->set(osg::Vec2(used.x() / static_cast<float>(width_), used.y() / static_cast<float>(height_)));
   UseLens();
   BackgroundsChanged();
@@ -315,7 +326,8 @@ void Optics::SetEyes(std::span<const Laparoscope> eyes) {
 
 void Optics::Eye::Look() {
   const Laparoscope from = smoothed ? smoothed->Jittered(seen) : seen;
-  field->setTextureAttribute(kPictureUnit, smoothed && !smoothed->moves() ? mean : scene.colour);
+  shows_mean = smoothed && !smoothed->moves();
+  field->setTextureAttribute(kPictureUnit, shows_mean ? mean : scene.colour);
   LookFrom(from, scene.camera);
   const auto is_of = [&](const Background& each) {
     return each.from && each.from->view == from.view && each.from->projection == from.projection &&
@@ -336,6 +348,30 @@ void Optics::Eye::Look() {
   LookFrom(from, next.target.camera);
   next.target.camera->setNodeMask(~0u);
   next.from = from;
+}
+
+void Optics::SetEdges(FindEdges find) {
+  find_edges_ = std::move(find);
+  SceneChanged();
+}
+
+void Optics::UpdateEdges() {
+  float soil = 0, reach = 1;
+  (void)soil_->get(soil);
+  (void)reach_->get(reach);
+  const Vec2f size(static_cast<float>(width_), static_cast<float>(height_));
+  bool found = true;
+  for (Eye& eye : eyes_) {
+    // The mean of several pictures has smooth edges, and no depth of its own.
+    const bool shown = find_edges_ && scale_ <= 1 && soil <= 0 && !eye.shows_mean;
+    eye.edges->setNodeMask(shown ? ~0u : 0u);
+    found = found && shown;
+    if (!shown || !edges_changed_) continue;
+    lines_.clear();
+    find_edges_(eye.seen, size, &lines_);
+    eye.edge_lines->Set(lines_, eye.seen, size, circle_radius_, reach);
+  }
+  if (found) edges_changed_ = false;
 }
 
 void Optics::SetSoil(float soil) {
@@ -361,6 +397,7 @@ void Optics::UseLens() {
 }
 
 void Optics::SceneChanged() {
+  edges_changed_ = true;
   for (Eye& eye : eyes_) {
     if (eye.smoothed) eye.smoothed->Changed();
     eye.Draw();

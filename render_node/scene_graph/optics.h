@@ -5,6 +5,7 @@
 // same.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <osg/Camera>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "render_node/geometry/laparoscope.h"
+#include "render_node/scene_graph/edge_lines.h"
 #include "render_node/scene_graph/smoothed_scene.h"
 
 namespace fulcrum::render {
@@ -33,6 +35,12 @@ class Optics {
   void SetMostScale(float most);
   /// Smooths edges with the last pictures of the scene (smoothed_scene.h); for a software rasteriser, scales up to 1.
   void SetSmoothed(bool on);
+  /// Appends the edges that an eye sees in a picture of so many pixels.
+  using FindEdges = std::function<void(const Laparoscope& eye, const Vec2f& size, std::vector<EdgeLine>* lines)>;
+  /// Smooths edges of known place in each picture (edge_lines.h) of scales up to 1; empty: not.
+  void SetEdges(FindEdges find);
+  /// Finds these edges again if the scene has changed; before a picture.
+  void UpdateEdges();
   /// Draws the scene again, at other places within its pixels, while that still makes the mean of its pictures better.
   /// Returns false, and does nothing, if it would not, or if it is not smoothed.
   bool Refine();
@@ -77,8 +85,11 @@ class Optics {
     Target scene;
     std::shared_ptr<SmoothedScene> smoothed;  // Null: not.
     osg::ref_ptr<osg::Texture2D> mean;        // Of smoothed.
+    bool shows_mean = false;
     osg::ref_ptr<osg::Uniform> light_position;
     osg::ref_ptr<osg::StateSet> field;
+    osg::ref_ptr<osg::Geode> edges;
+    std::shared_ptr<EdgeLines> edge_lines;
   };
   class CopyTarget;
   Target MakeTarget(int order, osg::Node* content);
@@ -86,7 +97,7 @@ class Optics {
   [[nodiscard]] bool smoothed() const { return !eyes_.empty() && eyes_.front().smoothed != nullptr; }
   void KeepBackgrounds(std::size_t count, Eye* eye);
   void BackgroundsChanged();
-  [[nodiscard]] osg::ref_ptr<osg::StateSet> AddField(osg::Texture2D* scene);
+  void AddField(Eye* eye);
   void UseScale();
   void UseLens();
   void ResizeTextures();
@@ -101,9 +112,13 @@ class Optics {
   float scale_ = 1, most_ = 1;
   osg::ref_ptr<osg::Group> node_;
   osg::ref_ptr<osg::Node> background_;
-  osg::ref_ptr<osg::Uniform> radius_, centre_, half_, texture_scale_, texture_most_, pixel_, soil_, haze_, smoke_;
+  osg::ref_ptr<osg::Uniform> radius_, centre_, half_, texture_scale_, texture_most_, pixel_, soil_, haze_, smoke_,
+      eye_pixels_, reach_;
   osg::ref_ptr<osg::Program> clear_lens_, smooth_lens_, soiled_lens_;
   std::vector<Eye> eyes_;
+  FindEdges find_edges_;
+  bool edges_changed_ = false;
+  std::vector<EdgeLine> lines_;  // Scratch.
 };
 
 }  // namespace fulcrum::render

@@ -22,7 +22,7 @@ enum class Order {
 };
 
 /// Texture units; the samplers of all programs are bound once at the scene's root, but for the burns of solids, which
-/// most sessions do not have. Units 6 and 7 are those of optics.cc and overlay.cc.
+/// most sessions do not have. Units 6, 7 and 9 are those of optics.cc and overlay.cc.
 enum TextureUnit { kAtlasUnit, kNoiseUnit, kSerosaUnit, kStructureUnit, kBurnUnit, kFilmUnit, kFatUnit = 8 };
 
 inline void DrawIn(Order order, osg::StateSet* state) {

@@ -165,6 +165,7 @@ class GoldenTest : public testing::Test {
   Bitmap Draw(const SyntheticMoment& moment, const std::function<void(LaparoscopeView*)>& change = {}) const {
     LaparoscopeView laparoscope(view_);
     const auto display = MakeOffscreenDisplay(laparoscope, view_.render);
+    laparoscope.SetSmoothEdges(true);  // As the node.
     laparoscope.SetTissue(moment.tissue.xyz);
     laparoscope.SetTopology(moment.topology);
     for (const TemperaturePatch& patch : moment.patches) {

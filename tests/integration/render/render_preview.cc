@@ -42,6 +42,7 @@ int main(int argc, char** argv) {
     const render::SyntheticMoment moment = render::MakeSyntheticMoment(view, std::strtod(argv[2], nullptr));
     render::LaparoscopeView laparoscope(view);
     const auto display = render::MakeOffscreenDisplay(laparoscope, view.render);
+    laparoscope.SetSmoothEdges(true);
     laparoscope.SetTissue(moment.tissue.xyz);
     laparoscope.SetTopology(moment.topology);
     const double bleeds_s = argc >= 11 ? std::strtod(argv[10], nullptr) : 0;
