@@ -24,7 +24,6 @@
 #include "tests/benchmark/report.h"
 #include "tests/integration/render/node_bus.h"
 #include "tests/integration/render/synthetic_scene.h"
-#include "tests/support/picture_statistics.h"
 
 namespace fulcrum::render {
 
@@ -80,13 +79,13 @@ SampledView::SampledView(const SceneView& scene, const SyntheticMoment& moment, 
   Show(moment, &laparoscope);
 }
 
-namespace {
-
 double CpuMs(clockid_t clock) {
   timespec now;
   clock_gettime(clock, &now);
   return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
 }
+
+namespace {
 
 std::int64_t MonotonicNs() {
   timespec now;
@@ -94,7 +93,8 @@ std::int64_t MonotonicNs() {
   return std::int64_t{1'000'000'000} * now.tv_sec + now.tv_nsec;
 }
 
-/// Moves the tissue slightly, so that no two pictures are equal.
+}  // namespace
+
 void Sway(const std::vector<float>& rest, int step, std::vector<float>* xyz) {
   const float lift = 0.001f * std::sin(0.4f * static_cast<float>(step));
   *xyz = rest;
@@ -102,6 +102,8 @@ void Sway(const std::vector<float>& rest, int step, std::vector<float>* xyz) {
     (*xyz)[k] += lift * std::sin(60 * (*xyz)[k - 1]);
   }
 }
+
+namespace {
 
 void FullScene(const SceneView& scene, StereoLayout layout, std::uint32_t width, std::uint32_t height,
                benchmark::Report* report) {
@@ -122,6 +124,7 @@ void FullScene(const SceneView& scene, StereoLayout layout, std::uint32_t width,
   QualityControl quality(Quality::kAuto, static_cast<int>(view.render.height), display->is_gpu());
   laparoscope.SetMostScale(quality.most());
   // As the node does for a window and live pictures.
+  laparoscope.SetSmoothEdges(true);
   std::vector<float> xyz;
   std::vector<double> frame_ms, cpu_side_ms;
   const int repeats = report->quick() ? 20 : 100, settling = 200;
@@ -205,25 +208,6 @@ void ReadBack(const SceneView& scene, benchmark::Report* report) {
     (void)display->TakeRead(true, &picture);
     display->DrawAndStartRead();
   });
-}
-
-/// Mean difference [of 255] from a picture of four by four samples a pixel, over its edge pixels.
-void Edges(const SceneView& scene, benchmark::Report* report) {
-  if (!report->Wants("render.edge_error")) return;
-  constexpr int kSamples = 4;
-  const SyntheticMoment moment = MakeSyntheticMoment(scene, 12.0);
-  const auto draw = [&](int size, float scale) {
-    SampledView sampled(scene, moment, size, scale);
-    sampled.laparoscope.Update();
-    Bitmap picture;
-    sampled.display->DrawAndRead(&picture);
-    return picture;
-  };
-  const Bitmap reference = Mean(draw(kSamples, 1), kSamples);
-  const std::vector<std::size_t> edges = EdgePixels(reference);
-  for (const auto& [name, scale] : kSampledScales) {
-    report->Add(std::string("render.edge_error.") + name, MeanDifference(draw(1, scale), reference, edges), "1/255");
-  }
 }
 
 void Uploads(const SceneView& view, benchmark::Report* report) {

@@ -4,7 +4,8 @@
 // motion, so with I_k the k-th picture of a quality
 //   flicker = mean of |(I_k+1 - I_k) - (R_k+1 - R_k)|  [of 255]
 // over channels, pictures, and the edge pixels (EdgePixels) of R_k. A constant difference from R does not count; that
-// is render.edge_error. The pictures have 8 bits, which alone gives up to half a step.
+// is render.edge_error. The pictures have 8 bits, which alone gives up to half a step. Keys with `plain_` are without
+// the smoothing of edges that the node switches on.
 #include <cmath>
 #include <cstdio>
 #include <string>
@@ -51,9 +52,10 @@ Bitmap MeanOf(const Sums& sums, int width, int height) {
 
 /// Draws `count` pictures of the moment from a creeping scope, `size` times as large, and gives each to `take`.
 template <class Take>
-void DrawCreeping(const SceneView& scene, const SyntheticMoment& moment, int count, int size, float scale,
+void DrawCreeping(const SceneView& scene, const SyntheticMoment& moment, int count, int size, float scale, bool smooth,
                   const Take& take) {
   SampledView sampled(scene, moment, size, scale);
+  sampled.laparoscope.SetSmoothEdges(smooth);
   const RenderParams& start = scene.render;
   const Mat3f axes = MakeLaparoscope(start).view.block<3, 3>(0, 0);  // Rows: the picture's axes in frame W.
   const float distance = (start.scope_target_W - start.scope_tip_W).norm();
@@ -79,7 +81,8 @@ void Flicker(const SceneView& scene, benchmark::Report* report) {
   const int count = report->quick() ? 5 : 25;
   const int width = static_cast<int>(scene.render.width), height = static_cast<int>(scene.render.height);
   std::vector<Sums> reference;
-  DrawCreeping(scene, moment, count, kSamples, 1, [&](int, const Bitmap& fine) { reference.push_back(SumsOf(fine)); });
+  DrawCreeping(scene, moment, count, kSamples, 1, false,
+               [&](int, const Bitmap& fine) { reference.push_back(SumsOf(fine)); });
   std::vector<std::vector<std::size_t>> edges;
   for (const Sums& sums : reference) edges.push_back(EdgePixels(MeanOf(sums, width, height)));
   // Mean of f(k, i) over the channels i of the edges of all pictures but the last.
@@ -98,12 +101,16 @@ void Flicker(const SceneView& scene, benchmark::Report* report) {
   };
   report->Add("render.temporal_flicker.ideal_change", mean(change), "1/255");
   for (const auto& [name, scale] : kSampledScales) {
-    std::vector<Bitmap> pictures;
-    DrawCreeping(scene, moment, count, 1, scale, [&](int, const Bitmap& picture) { pictures.push_back(picture); });
-    report->Add(std::string("render.temporal_flicker.") + name, mean([&](std::size_t k, std::size_t i) {
-                  return int{pictures[k + 1].rgb[i]} - int{pictures[k].rgb[i]} - change(k, i);
-                }),
-                "1/255");
+    for (const bool smooth : {false, true}) {
+      std::vector<Bitmap> pictures;
+      DrawCreeping(scene, moment, count, 1, scale, smooth,
+                   [&](int, const Bitmap& picture) { pictures.push_back(picture); });
+      report->Add(std::string("render.temporal_flicker.") + (smooth ? "" : "plain_") + name,
+                  mean([&](std::size_t k, std::size_t i) {
+                    return int{pictures[k + 1].rgb[i]} - int{pictures[k].rgb[i]} - change(k, i);
+                  }),
+                  "1/255");
+    }
   }
 }
 

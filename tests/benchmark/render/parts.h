@@ -1,6 +1,7 @@
 // Parts of bench_render, each with its own keys.
 #pragma once
 
+#include <ctime>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -28,6 +29,11 @@ struct SampledView {
 /// Mean difference of the channels of some pixels [of 255].
 [[nodiscard]] double MeanDifference(const Bitmap& a, const Bitmap& b, const std::vector<std::size_t>& pixels);
 
+/// Time of a clock [ms].
+[[nodiscard]] double CpuMs(clockid_t clock);
+/// Moves the tissue slightly, so that no two pictures are equal.
+void Sway(const std::vector<float>& rest, int step, std::vector<float>* xyz);
+
 /// The qualities whose pictures are compared with many samples a pixel, by scale.
 constexpr std::pair<const char*, float> kSampledScales[] = {
     {"low", 0.52f}, {"high", 1.0f}, {"smooth2", 2.0f}, {"smooth4", 4.0f}};
@@ -39,6 +45,8 @@ void LookFigures(const SceneView& built_in, benchmark::Report* report);
 /// render.cut.*: cost of the lips and strands of a whole cut.
 void CutFigures(const SceneView& scene, benchmark::Report* report);
 
+/// render.edge_error.*, render.smooth_edges.*: edges against many samples a pixel, and what smoothing them costs.
+void Edges(const SceneView& scene, benchmark::Report* report);
 /// render.temporal_flicker.*: edges while the scope creeps.
 void Flicker(const SceneView& scene, benchmark::Report* report);
 
