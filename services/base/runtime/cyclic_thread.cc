@@ -40,6 +40,13 @@ NextPeriod PlanNextPeriod(std::int64_t previous_wake_ns, std::int64_t period_ns,
   return {next + skipped * period_ns, static_cast<std::uint64_t>(skipped)};
 }
 
+void SpinMargin::Add(std::int64_t late_ns) {
+  // Steps in the ratio of 19 to 1 balance where one wake-up of twenty is later than the margin. From 50 us down to 20
+  // us takes 750 periods.
+  constexpr std::int64_t kDown_ns = 40, kUp_ns = 19 * kDown_ns;
+  margin_ns_ = std::clamp(margin_ns_ + (late_ns > margin_ns_ ? kUp_ns : -kDown_ns), std::int64_t{0}, longest_ns_);
+}
+
 struct CyclicThread::Impl {
   CyclicThreadSettings settings;
   std::int64_t grid_ns = 0;  ///< Argument of Start().
@@ -81,12 +88,16 @@ struct CyclicThread::Impl {
   }
 
   /// False if the thread must stop. `*begin_ns`: the last reading of the clock before the return.
-  bool WaitFor(std::int64_t wake_ns, std::int64_t* begin_ns) const {
-    const std::int64_t sleep_end = wake_ns - settings.spin_ns;
-    for (std::int64_t now = MonotonicNs(); now < sleep_end; now = MonotonicNs()) {
+  bool WaitFor(std::int64_t wake_ns, SpinMargin* spin, std::int64_t* begin_ns) const {
+    const bool rests = settings.rests != nullptr && settings.rests->load(std::memory_order_relaxed);
+    const std::int64_t sleep_end = wake_ns - (rests ? 0 : spin->value_ns());
+    bool slept = false;
+    for (*begin_ns = MonotonicNs(); *begin_ns < sleep_end; *begin_ns = MonotonicNs()) {
       if (stop.load(std::memory_order_relaxed)) return false;
-      SleepUntil(std::min(sleep_end, now + kMaxSleepNs));
+      SleepUntil(std::min(sleep_end, *begin_ns + kMaxSleepNs));
+      slept = true;
     }
+    if (slept) spin->Add(*begin_ns - sleep_end);
     do {
       *begin_ns = MonotonicNs();
     } while (*begin_ns < wake_ns);
@@ -100,8 +111,9 @@ struct CyclicThread::Impl {
     const std::int64_t start_ns = MonotonicNs();
     std::int64_t wake_ns =
         grid_ns == 0 ? start_ns + settings.period_ns : PlanNextPeriod(grid_ns, settings.period_ns, start_ns).wake_ns;
+    SpinMargin spin(settings.spin_ns);
     std::int64_t begin = 0;
-    while (WaitFor(wake_ns, &begin)) {
+    while (WaitFor(wake_ns, &spin, &begin)) {
       wake.Add(begin - wake_ns);
       tick.stamp_ns = begin;
       callback(tick);

@@ -17,8 +17,10 @@ struct CyclicThreadSettings {
   std::string name = "cyclic";  ///< Thread name, at most 15 characters.
   std::int64_t period_ns = 10'000'000;
   int fifo_priority = 0;     ///< 0: normal scheduling; otherwise SCHED_FIFO if permitted, with one warning if not.
-  std::int64_t spin_ns = 0;  ///< The thread sleeps until this long before the period, then spins.
-  int cpu = -1;              ///< CPU to which the thread is pinned; -1: any.
+  std::int64_t spin_ns = 0;  ///< Longest time before a period for which the thread spins instead of sleeping.
+  /// While true, nothing depends on the begin of a period to some microseconds: the thread does not spin. Outlives it.
+  const std::atomic<bool>* rests = nullptr;
+  int cpu = -1;  ///< CPU to which the thread is pinned; -1: any.
 };
 
 /// Snapshot that another thread may read at any time.
@@ -60,5 +62,20 @@ struct NextPeriod {
   std::uint64_t skipped;
 };
 [[nodiscard]] NextPeriod PlanNextPeriod(std::int64_t previous_wake_ns, std::int64_t period_ns, std::int64_t now_ns);
+
+/// Time before a period at which a sleep must end so that the thread is late in one of twenty periods. Pure: follows
+/// that quantile of the measured lateness of wake-ups, in small steps, so that a thread spins no longer than its
+/// wake-ups need.
+class SpinMargin {
+ public:
+  /// @param longest_ns upper limit, and the value before the first sleep.
+  explicit SpinMargin(std::int64_t longest_ns) : longest_ns_(longest_ns), margin_ns_(longest_ns) {}
+  /// @param late_ns end of a sleep after the time that was asked for [ns].
+  void Add(std::int64_t late_ns);
+  [[nodiscard]] std::int64_t value_ns() const { return margin_ns_; }
+
+ private:
+  std::int64_t longest_ns_, margin_ns_;
+};
 
 }  // namespace fulcrum::runtime

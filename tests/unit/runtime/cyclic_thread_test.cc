@@ -3,9 +3,15 @@
 #include <gtest/gtest.h>
 #include <pthread.h>
 #include <signal.h>
+#include <time.h>
 
 #include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <random>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "services/base/runtime/realtime.h"
@@ -45,6 +51,51 @@ TEST(PlanNextPeriod, KeepsThePhaseForAnyLateness) {
     EXPECT_LE(plan.wake_ns - now, kPeriod);
     EXPECT_EQ(plan.wake_ns, previous + kPeriod * static_cast<std::int64_t>(1 + plan.skipped));
   }
+}
+
+TEST(SpinMargin, IsLateInOneOfTwentyPeriodsAndNeverLongerThanSet) {
+  std::mt19937_64 random(1);
+  std::exponential_distribution<double> more(1 / 4e3);
+  const auto late_ns = [&] { return 10'000 + static_cast<std::int64_t>(more(random)); };
+  SpinMargin margin(100'000);
+  EXPECT_EQ(margin.value_ns(), 100'000) << "before anything is known";
+  for (int i = 0; i < 10'000; ++i) margin.Add(late_ns());
+  int late = 0;
+  double sum_ns = 0;
+  constexpr int kPeriods = 100'000;
+  for (int i = 0; i < kPeriods; ++i) {
+    const std::int64_t ns = late_ns();
+    late += ns > margin.value_ns() ? 1 : 0;
+    sum_ns += static_cast<double>(margin.value_ns());
+    margin.Add(ns);
+  }
+  EXPECT_NEAR(late, 0.05 * kPeriods, 0.005 * kPeriods);
+  EXPECT_NEAR(sum_ns / kPeriods, 10e3 + 4e3 * std::log(20), 2e3);
+  for (int i = 0; i < 1000; ++i) margin.Add(1'000'000);
+  EXPECT_EQ(margin.value_ns(), 100'000);
+  SpinMargin none(0);
+  none.Add(5'000);
+  EXPECT_EQ(none.value_ns(), 0);
+}
+
+TEST(CyclicThread, SpinsBeforeAPeriodUnlessItRests) {
+  // Before a period the thread reads the clock without pause: nearly all of a long spin is processor time.
+  const auto cpu_of = [](bool resting) {
+    std::atomic<bool> rests{resting};
+    double begin_s = 0, end_s = 0;
+    int ticks = 0;
+    CyclicThread thread(
+        {.name = "test", .period_ns = kPeriod, .spin_ns = kPeriod / 2, .rests = &rests}, [&](const Tick&) {
+          timespec now{};
+          ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+          (ticks++ == 0 ? begin_s : end_s) = static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+        });
+    thread.Start();
+    while (thread.stats().ticks < 200) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    thread.Stop();
+    return (end_s - begin_s) / ticks;
+  };
+  EXPECT_LT(cpu_of(true), 0.5 * cpu_of(false));
 }
 
 TEST(CyclicThread, IndexCountsSkippedPeriodsAndStampsGrow) {
