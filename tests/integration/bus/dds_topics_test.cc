@@ -2,9 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <limits>
+#include <string>
+#include <thread>
 
 #include "services/base/core/error.h"
 #include "services/transport/bus/dds/abandoned_mutex.h"
@@ -156,6 +160,53 @@ TEST(DdsInput, BurstOfReliableEventsArrivesWhole) {
     ASSERT_TRUE(Eventually([&] { return bus.in->TakeNext(&got); }));
     ASSERT_EQ(got.stamp.sequence, i);
   }
+}
+
+/// Voluntary changes of threads in this process since its start.
+std::int64_t ThreadChanges() {
+  std::int64_t sum = 0;
+  for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
+    std::ifstream status(task.path() / "status");
+    for (std::string word; status >> word;) {
+      std::int64_t count = 0;
+      if (word == "voluntary_ctxt_switches:" && status >> count) sum += count;
+    }
+  }
+  return sum;
+}
+
+/// Changes of threads for each of many samples that are sent one by one.
+template <class T>
+double ThreadChangesPerSample() {
+  Pair<T> bus;
+  T got;
+  std::uint64_t sent = 0, received = 0;
+  const auto stream = [&](int samples) {
+    for (int i = 0; i < samples; ++i) {
+      EXPECT_TRUE(bus.out->Write(test::Sample<T>(++sent)));
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      while (bus.in->TakeNext(&got)) ++received;
+    }
+  };
+  stream(100);  // More than a history: a full one makes the library ask with each sample.
+  const std::int64_t before = ThreadChanges();
+  constexpr int kSamples = 300;
+  stream(kSamples);
+  const double changes = static_cast<double>(ThreadChanges() - before) / kSamples;
+  EXPECT_TRUE(Eventually([&] {
+    while (bus.in->TakeNext(&got)) ++received;
+    return received == sent;
+  }));
+  EXPECT_EQ(bus.in->stats().lost, 0u);
+  return changes;
+}
+
+// Each answer wakes two threads of the reader's side and one of the writer's.
+TEST(DdsOutput, AReliableStreamIsNotAnsweredSampleBySample) {
+  const double stream = ThreadChangesPerSample<CauteryContact>();
+  const double one_by_one = ThreadChangesPerSample<GeneratorSetting>();  // Rare: each sample is answered.
+  RecordProperty("stream", std::to_string(stream));
+  EXPECT_LT(stream, 0.88 * one_by_one) << "changes of threads a sample; " << one_by_one << " if each one is answered";
 }
 
 TEST(RawInput, HearsAllThatAWriterSaidBeforeItLeft) {
