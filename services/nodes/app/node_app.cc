@@ -1,5 +1,6 @@
 #include "services/nodes/app/node_app.h"
 
+#include <sys/eventfd.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,6 +19,7 @@
 #include <utility>
 
 #include "services/base/core/error.h"
+#include "services/base/runtime/file_descriptor.h"
 #include "services/base/runtime/realtime.h"
 #include "services/base/runtime/service_notify.h"
 #include "services/nodes/app/cart_security.h"
@@ -37,8 +39,8 @@ using runtime::MonotonicNs;
 
 constexpr std::int64_t kSessionUnknown = std::numeric_limits<std::int64_t>::max();
 constexpr auto kPollPeriod = std::chrono::milliseconds(10);
-/// During the session only orders, refusals and another scene are expected.
-constexpr auto kServePeriod = std::chrono::milliseconds(20);
+/// During the session only refusals and another scene are looked for; orders, signals and End() end the wait.
+constexpr auto kServePeriod = std::chrono::milliseconds(100);
 /// Phase of a node's steps relative to multiples k of the session's period dt, in periods. Physics begins just after k
 /// dt, when the ToolState of that time has arrived; thermal begins when the contact of that physics step has arrived.
 constexpr double kPhysicsPhase = 0.12, kThermalPhase = 0.65;
@@ -134,6 +136,7 @@ struct NodeApp::Impl {
     Log(code == ExitCode::kDone ? LogLevel::kInfo : LogLevel::kError, reason);
     exit_code = code;
     ended.store(true, std::memory_order_release);  // Publishes exit_code.
+    (void)::eventfd_write(end_event.get(), 1);
   }
 
   [[nodiscard]] bool ShouldEnd() const noexcept {
@@ -215,7 +218,12 @@ struct NodeApp::Impl {
   }
 
   void ServeUntilEnd() {
-    for (; !ShouldEnd(); std::this_thread::sleep_for(kServePeriod)) Poll();
+    while (!ShouldEnd()) {
+      Poll();
+      std::vector<int> awaited{end_event.get()};
+      orders->AddDescriptors(&awaited);
+      if (!ShouldEnd()) control::AwaitInput(awaited, kServePeriod);
+    }
   }
 
   void EndThreads(runtime::CyclicThread* steps, std::jthread* health) {
@@ -283,6 +291,7 @@ struct NodeApp::Impl {
   std::atomic<bool> stepping{false};
   std::mutex end_mutex;
   std::atomic<bool> ended{false};
+  const runtime::FileDescriptor end_event{::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)};  ///< Can be read once it ends.
   ExitCode exit_code = ExitCode::kDone;
 };
 

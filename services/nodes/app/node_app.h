@@ -75,10 +75,10 @@ class NodeApp {
   [[nodiscard]] bus::DdsParticipant& bus();
 
   /// Makes ports that the app owns: they exist as long as the app, and their statistics are part of Health. Make all
-  /// ports before Run().
+  /// ports before Run(). `notify` as for DdsParticipant::MakeInput.
   template <class T>
-  [[nodiscard]] bus::Input<T>& MakeInput() {
-    auto port = bus().MakeInput<T>();
+  [[nodiscard]] bus::Input<T>& MakeInput(std::function<void()> notify = {}) {
+    auto port = bus().MakeInput<T>(std::move(notify));
     bus::Input<T>& input = *port;
     Watch(bus::kTopicOf<T>, [&input] { return input.stats(); });
     Keep(std::shared_ptr<void>(std::move(port)));

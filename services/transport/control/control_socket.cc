@@ -189,6 +189,17 @@ void Server::Serve(const Handler& handle) {
   });
 }
 
+void Server::AddDescriptors(std::vector<int>* descriptors) const {
+  descriptors->push_back(listening_);
+  for (const Connection& connection : connections_) descriptors->push_back(connection.socket);
+}
+
+void AwaitInput(const std::vector<int>& descriptors, std::chrono::milliseconds longest) {
+  std::vector<pollfd> inputs;
+  for (const int descriptor : descriptors) inputs.push_back({descriptor, POLLIN, 0});
+  (void)::poll(inputs.data(), inputs.size(), static_cast<int>(longest.count()));
+}
+
 Reply Ask(int connection, const Request& request, double limit_s) {
   // A server that does not admit this user replies and closes at once, perhaps before the request is sent.
   if (!SendPacket(connection, PacketOf(request)) && errno != EPIPE && errno != ECONNRESET) {

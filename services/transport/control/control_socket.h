@@ -8,6 +8,7 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -72,6 +73,8 @@ class Server {
   /// admitted are closed and counted.
   void Serve(const Handler& handle);
   [[nodiscard]] std::uint64_t refused() const { return refused_; }
+  /// Adds the descriptors that can be read when Serve() has something to do.
+  void AddDescriptors(std::vector<int>* descriptors) const;
 
  private:
   struct Connection {
@@ -86,6 +89,9 @@ class Server {
   std::vector<Connection> connections_;
   std::uint64_t refused_ = 0;
 };
+
+/// Waits until one of the descriptors can be read, a signal with a handler arrives, or the time is over.
+void AwaitInput(const std::vector<int>& descriptors, std::chrono::milliseconds longest);
 
 /// Sends a request and waits for the reply. Throws InputError if no process listens there or this user is not admitted,
 /// std::runtime_error if no reply arrives within the time.

@@ -68,6 +68,28 @@ class ControlSocket : public ::testing::Test {
   fs::path folder_, socket_;
 };
 
+TEST_F(ControlSocket, AServerMaySleepUntilARequestArrives) {
+  Server server(socket_);
+  const auto descriptors = [&server] {
+    std::vector<int> all;
+    server.AddDescriptors(&all);
+    return all;
+  };
+  const auto begin = std::chrono::steady_clock::now();
+  AwaitInput(descriptors(), 30ms);
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, 30ms) << "nobody asks";
+  std::future<Reply> reply = std::async(std::launch::async, [&] { return Ask(socket_, {"down", ""}); });
+  // First the connection, then the request over it.
+  for (int turn = 0; turn < 20 && reply.wait_for(0s) != std::future_status::ready; ++turn) {
+    AwaitInput(descriptors(), 5s);
+    server.Serve([](const Request& request) { return Reply{true, request.verb}; });
+    if (descriptors().size() == 1) reply.wait_for(1s);
+  }
+  ASSERT_EQ(reply.wait_for(5s), std::future_status::ready);
+  EXPECT_EQ(reply.get().text, "down");
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, 5s);
+}
+
 TEST_F(ControlSocket, CarriesARequestAndItsReply) {
   Server server(socket_);
   struct stat status {};
