@@ -34,6 +34,13 @@ void CommandDesk::Serve(std::int64_t now_ns) {
   others_.Serve(execute);
 }
 
+std::vector<int> CommandDesk::descriptors() const {
+  std::vector<int> descriptors;
+  own_.AddDescriptors(&descriptors);
+  others_.AddDescriptors(&descriptors);
+  return descriptors;
+}
+
 CommandAnswer CommandDesk::Execute(const control::Request& request, std::int64_t now_ns) const {
   std::string known;
   for (const Verb& verb : verbs_) {

@@ -35,6 +35,8 @@ class CommandDesk {
 
   /// Executes the commands that have arrived.
   void Serve(std::int64_t now_ns);
+  /// Descriptors that can be read when a command has arrived.
+  [[nodiscard]] std::vector<int> descriptors() const;
   /// Callers that were refused: of another user and not of the group.
   [[nodiscard]] std::uint64_t refused() const { return own_.refused() + others_.refused(); }
 

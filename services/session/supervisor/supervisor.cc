@@ -6,7 +6,6 @@
 #include <optional>
 #include <string>
 #include <system_error>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -16,6 +15,7 @@
 #include "services/session/supervisor/command_desk.h"
 #include "services/session/supervisor/crash_watch.h"
 #include "services/session/supervisor/dump_trigger.h"
+#include "services/session/supervisor/loop_wait.h"
 #include "services/session/supervisor/node_orders.h"
 #include "services/session/supervisor/node_process.h"
 #include "services/session/supervisor/refusal_journal.h"
@@ -232,7 +232,7 @@ struct Supervisor::Impl {
     ShowProgress(now);
     status.Update(now);
     ending |= runtime::ShouldStop();
-    std::this_thread::sleep_for(kLoopPeriod);
+    wait.Wait(desk->descriptors(), clock.begun() ? kSessionPeriod : kLoopPeriod);
   }
 
   /// Services end with the unit of the supervisor; systemd would restart one that is killed.
@@ -335,6 +335,7 @@ struct Supervisor::Impl {
 
   SessionSetup setup;
   CrashWatch crash_watch;  ///< Begins before there are threads.
+  LoopWait wait;
 
   std::optional<bus::DdsParticipant> participant;
   std::optional<RemoteNodes> remote;  ///< Empty: all nodes run here.

@@ -9,6 +9,8 @@
 namespace fulcrum::supervisor {
 
 inline constexpr auto kLoopPeriod = std::chrono::milliseconds(5);
+/// Of the supervisor while the session runs: deaths of nodes and commands interrupt it, and a Health may wait.
+inline constexpr auto kSessionPeriod = std::chrono::milliseconds(20);
 /// From a death to the sweep of shared memory [ns]. The sweep removes names only: a process that has files of the dead
 /// process open keeps them until their lease expires.
 inline constexpr std::int64_t kSweepAfter_ns = 2 * kSecond_ns;
