@@ -17,12 +17,13 @@ constexpr std::size_t kReadBytes = 512;
 /// Longest time between two samples while nothing changes and no pedal is down: short for 0.2 s after a change, so that
 /// a lost sample is repeated, then long.
 constexpr std::int64_t kShortSilence_ns = 9'000'000, kLongSilence_ns = 39'000'000, kRestsAfter_ns = 200'000'000;
-/// Smaller changes of an angle, up to two thirds of a count of the converter, are mostly noise.
+/// Changes of an angle since the newest sample that are published at once. A count of the converter is 0.03 rad.
 constexpr float kSameAngle_rad = 0.005f;
+/// Smaller changes since the last one, up to 0.4 counts, are noise of a jaw that rests between two counts.
+constexpr float kRestingAngle_rad = 0.012f;
 
-bool LooksTheSame(const HandleSample& a, const HandleSample& b) {
-  return a.present == b.present && a.quality == b.quality &&
-         std::abs(a.jaw_angle_rad - b.jaw_angle_rad) < kSameAngle_rad;
+bool LooksTheSame(const HandleSample& a, const HandleSample& b, float angle_rad) {
+  return a.present == b.present && a.quality == b.quality && std::abs(a.jaw_angle_rad - b.jaw_angle_rad) < angle_rad;
 }
 
 }  // namespace
@@ -86,15 +87,18 @@ void HandleBridgeNode::Step(const Tick& tick) {
 
 /// A pedal that is down is repeated each period: whether the current flows must not wait.
 void HandleBridgeNode::Publish(const Tick& tick) {
-  const auto is_like = [this](const HandleState& other) {
+  const auto is_like = [this](const HandleState& other, float angle_rad) {
+    const auto same = [angle_rad](const HandleSample& a, const HandleSample& b) {
+      return LooksTheSame(a, b, angle_rad);
+    };
     return state_.pedals == kPedalNone && state_.pedals == other.pedals &&
-           std::equal(state_.handles.begin(), state_.handles.end(), other.handles.begin(), &LooksTheSame);
+           std::equal(state_.handles.begin(), state_.handles.end(), other.handles.begin(), same);
   };
-  if (!is_like(rest_)) {
+  if (!is_like(rest_, kRestingAngle_rad)) {
     rest_ = state_;
     changed_ns_ = tick.stamp_ns;
   }
-  const bool quiet = is_like(sent_);
+  const bool quiet = is_like(sent_, kSameAngle_rad);
   const std::int64_t silence_ns = tick.stamp_ns - changed_ns_ < kRestsAfter_ns ? kShortSilence_ns : kLongSilence_ns;
   if ((quiet && tick.stamp_ns - sent_.stamp.stamp_ns < silence_ns) || !output_->has_readers()) return;
   state_.stamp = stamper_.Next(tick.stamp_ns);

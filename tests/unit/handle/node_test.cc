@@ -296,6 +296,25 @@ TEST_F(NodeTest, AJawThatMovesSlowlyIsNotAtRest) {
   EXPECT_GE(state_.stamp.sequence - begin, 180u) << "a hundred times a second";
 }
 
+TEST_F(NodeTest, NoiseBetweenTwoCountsIsRestAndAChangeBeyondItIsPublishedInItsTick) {
+  const auto published_at_ns = [this] { return state_.stamp.stamp_ns; };
+  for (const double jaw_deg : {0.0, 20.0, 33.3}) {
+    for (int i = 0; i < 800; ++i) Tick(jaw_deg);
+    const std::uint64_t begin = state_.stamp.sequence;
+    double sent_deg = jaw0_deg();
+    for (int i = 0; i < 4000; ++i) {
+      Tick(jaw_deg);
+      const double change_deg = std::abs(MetricOf("jaw0_deg") - sent_deg);
+      sent_deg = jaw0_deg();
+      const auto now_ns = static_cast<std::int64_t>(2500000 * (index_ - 1));
+      if (change_deg > 0.3) {
+        ASSERT_EQ(published_at_ns(), now_ns) << "a change by " << change_deg << " degrees";
+      }
+    }
+    EXPECT_LE(state_.stamp.sequence - begin, 450u) << "in 10 s at " << jaw_deg << " degrees";
+  }
+}
+
 TEST_F(NodeTest, AbsentHandleIsNeitherPublishedNorMissed) {
   HandleBridgeNode::Links links;
   links.handles[0] = MakeLink(&handle_[0]);
