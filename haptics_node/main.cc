@@ -1,8 +1,7 @@
 // haptics_node: the 1 kHz servo between the operator's hands and the tissue.
 #include <algorithm>
-#include <chrono>
+#include <memory>
 #include <string>
-#include <thread>
 #include <utility>
 
 #include "haptics_node/calibrate_command.h"
@@ -19,28 +18,35 @@ using fulcrum::Tick;
 
 // The bus thread runs below the servo, above the nodes at 100 Hz.
 constexpr int kPriorityBelowServo = 20;
-/// At rest it passes over three periods.
-constexpr std::chrono::milliseconds kRest(3);
+/// It rests for at most this often in a row, then looks whether it is to end.
+constexpr int kMostRests = 20;
 
 fulcrum::ExitCode RunHaptics(fulcrum::app::NodeApp& app) {
   fulcrum::haptics::CartDevices cart =
       fulcrum::haptics::MakeCartDevices(app.cart(), app.scene(), fulcrum::haptics::TrocarFolder());
   for (const std::string& note : cart.notes) Log(fulcrum::runtime::LogLevel::kInfo, note);
   if (cart.touch) cart.touch->Start();
-  fulcrum::haptics::HapticsNode node(app.scene(), std::move(cart.devices),
-                                     {app.MakeInput<fulcrum::ContactModel>(), app.MakeInput<fulcrum::OperatorInput>(),
-                                      app.MakeOutput<fulcrum::ToolState>(), app.MakeOutput<fulcrum::TickManifest>()},
-                                     fulcrum::runtime::MonotonicNs());
+  const auto bell = std::make_shared<fulcrum::haptics::Bell>();  // The ports outlive the node.
+  const auto ring = [bell] { bell->Ring(); };
+  fulcrum::haptics::HapticsNode node(
+      app.scene(), std::move(cart.devices),
+      {app.MakeInput<fulcrum::ContactModel>(ring), app.MakeInput<fulcrum::OperatorInput>(ring),
+       app.MakeOutput<fulcrum::ToolState>(), app.MakeOutput<fulcrum::TickManifest>(), bell},
+      fulcrum::runtime::MonotonicNs());
 
-  const fulcrum::runtime::CyclicThreadSettings servo = app.timing();
+  fulcrum::runtime::CyclicThreadSettings servo = app.timing();
   fulcrum::runtime::CyclicThreadSettings below = servo;
   below.name = "haptics_bus";
   below.fifo_priority = std::max(0, servo.fifo_priority - kPriorityBelowServo);
   below.spin_ns = 0;
   below.cpu = -1;
+  servo.rests = node.resting();
   fulcrum::runtime::CyclicThread bus(below, [&](const Tick&) {
     node.BusStep();
-    if (node.rests()) std::this_thread::sleep_for(kRest);
+    for (int i = 0; i < kMostRests && node.rests(); ++i) {
+      node.Rest();
+      node.BusStep();
+    }
   });
   bus.Start();
   return app.Run(

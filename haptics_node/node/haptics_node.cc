@@ -42,6 +42,9 @@ void AddTrouble(Health* health, const std::string& trouble) {
 
 }  // namespace
 
+/// Period of the servo.
+constexpr std::int64_t kTick_ns = 1'000'000;
+
 static_assert(kTicksPerManifest <= bus::kMaxTickTimes, "a manifest must have room for the times of its ticks");
 
 HapticsNode::HapticsNode(const SceneView& scene, const std::array<bool, kMaxTools>& simulated, const Ports& ports,
@@ -83,6 +86,8 @@ void HapticsNode::ServoStep(const Tick& tick) noexcept {
   contacts_used_ = figures.contacts_used;
   figures_.Store(figures);
   if (!from_servo_.TryPush(tick_)) records_lost_.fetch_add(1, std::memory_order_relaxed);
+  if (rests_.load(std::memory_order_relaxed) && !AreAtRest(last_tools_, tick_.servo.tool)) ports_.bell->Ring();
+  last_tools_ = tick_.servo.tool;
 }
 
 void HapticsNode::BusStep() {
@@ -95,13 +100,21 @@ void HapticsNode::BusStep() {
     }
   }
   while (from_servo_.TryPop(&record_)) Publish(record_);
+  rests_.store(IsAtRest(), std::memory_order_relaxed);
 }
 
-bool HapticsNode::rests() const {
+bool HapticsNode::IsAtRest() const {
   constexpr std::size_t kSettled_ticks = 100;
   return thinner_.still_ticks() >= kSettled_ticks &&
          std::all_of(received_.devices.begin(), received_.devices.end(),
                      [](const DeviceContacts& device) { return device.count == 0; });
+}
+
+void HapticsNode::Rest() {
+  // A record is pushed within this time of the begin of its tick, or is taken the next time.
+  constexpr std::int64_t kServoStep_ns = 500'000;
+  const auto ticks = static_cast<std::int64_t>(thinner_.ticks_to_next());
+  ports_.bell->WaitUntil(record_.servo.tool.stamp.stamp_ns + ticks * kTick_ns + kServoStep_ns);
 }
 
 void HapticsNode::Publish(const TickRecord& tick) {

@@ -5,9 +5,11 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <memory>
 
 #include "haptics_node/device/haptic_device.h"
 #include "haptics_node/device/operated_device.h"
+#include "haptics_node/node/bell.h"
 #include "haptics_node/node/tool_thinner.h"
 #include "haptics_node/servo/servo.h"
 #include "services/base/core/messages.h"
@@ -31,6 +33,7 @@ class HapticsNode {
     bus::Input<OperatorInput>& operator_input;
     bus::Output<ToolState>& tool_state;
     bus::Output<TickManifest>& tick_manifest;
+    std::shared_ptr<Bell> bell = std::make_shared<Bell>();  ///< To be rung when a message has arrived.
   };
 
   /// Scene and ports must outlive the node. A tool without a device is not published.
@@ -43,13 +46,17 @@ class HapticsNode {
   /// Servo thread, each millisecond. Does not wait, lock, allocate, log or throw.
   void ServoStep(const Tick& tick) noexcept;
 
-  /// Bus thread, each millisecond, at rest each four: newest contact model in, records of the servo out. In a replay or
-  /// a test, call it before and after ServoStep() on one thread.
+  /// Bus thread, each millisecond, at rest after Rest(): newest contact model in, records of the servo out. In a replay
+  /// or a test, call it before and after ServoStep() on one thread.
   void BusStep();
 
-  /// No tool has moved for a tenth of a second and none is near tissue: BusStep() is early enough each few
-  /// milliseconds. Bus thread.
-  [[nodiscard]] bool rests() const;
+  /// No tool has moved for a tenth of a second and none is near tissue. Bus thread.
+  [[nodiscard]] bool rests() const { return rests_.load(std::memory_order_relaxed); }
+  /// The same, for any thread.
+  [[nodiscard]] const std::atomic<bool>* resting() const { return &rests_; }
+  /// While the node rests: waits until the next sample is due, at most ToolThinner::kMostTicks ticks; less if a tool
+  /// moves or the bell rings. BusStep() is to follow. Bus thread.
+  void Rest();
 
   /// State hash of the servo after the newest tick that BusStep() has published. Bus thread.
   [[nodiscard]] std::uint64_t state_hash() const { return record_.servo.state_hash; }
@@ -65,6 +72,7 @@ class HapticsNode {
     bool input_taken = false;                           ///< Followed since the last tick.
   };
 
+  [[nodiscard]] bool IsAtRest() const;
   void Publish(const TickRecord& record);
   void FillDeviceHealth(Health* health) const;
 
@@ -83,7 +91,10 @@ class HapticsNode {
   runtime::Histogram motion_to_force_;
   std::atomic<std::uint64_t> models_not_taken_{0}, inputs_not_taken_{0}, records_lost_{0};
 
+  std::atomic<bool> rests_{false};  ///< Relaxed: a tick that misses a change is followed by one that does not.
+
   // Servo thread only.
+  ToolState last_tools_;
   ContactModel arrived_;
   OperatorInput input_;
   TickRecord tick_;

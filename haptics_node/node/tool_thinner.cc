@@ -37,6 +37,8 @@ bool Between(const ToolSample& a, const ToolSample& m, const ToolSample& b, floa
 
 }  // namespace
 
+bool AreAtRest(const ToolState& a, const ToolState& b) { return Each(a, b, Same); }
+
 ToolThinner::ToolThinner(double physics_dt_s) : dt_s_(std::max(physics_dt_s, kShortestDt_s)) {}
 
 bool ToolThinner::IsAsked(double session_time_s) {
@@ -57,7 +59,7 @@ const ToolThinner::Due& ToolThinner::Add(const ToolState& tools, double session_
     return due_;
   }
   const bool rested = rest_ticks_ == count_;
-  if (rested && Each(tools, published_, Same)) {
+  if (rested && AreAtRest(tools, published_)) {
     between_[count_++] = tools;
     ++rest_ticks_;
     ++still_ticks_;

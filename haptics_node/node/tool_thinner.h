@@ -10,6 +10,9 @@
 
 namespace fulcrum::haptics {
 
+/// No tool has changed in any way that a reader can see, but for the age of its contact model.
+[[nodiscard]] bool AreAtRest(const ToolState& a, const ToolState& b);
+
 class ToolThinner {
  public:
   /// Longest time between two samples [ticks].
@@ -30,6 +33,8 @@ class ToolThinner {
   const Due& Add(const ToolState& tools, double session_time_s);
   /// Newest ticks in which nothing has changed.
   [[nodiscard]] std::size_t still_ticks() const { return still_ticks_; }
+  /// Ticks after which the next state is published, if nothing changes until then.
+  [[nodiscard]] std::size_t ticks_to_next() const { return kMostTicks - count_; }
 
  private:
   [[nodiscard]] bool IsAsked(double session_time_s);

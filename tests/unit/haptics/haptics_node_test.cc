@@ -5,10 +5,15 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+#include <functional>
+#include <iterator>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "services/base/runtime/cyclic_thread.h"
 #include "tests/unit/haptics/node_bus.h"
 #include "tests/unit/haptics/rig.h"
 #include "tests/unit/haptics/test_tissue.h"
@@ -206,6 +211,79 @@ TEST_F(HapticsNodeTest, RestsWhileNothingMovesAndNothingIsNear) {
   EXPECT_LT(rested.back(), 502u) << "it moves";
   EXPECT_EQ(std::count_if(rested.begin(), rested.end(), [](std::uint64_t ms) { return ms >= 400 && ms < 410; }), 0);
   EXPECT_GT(rested.size(), 350u);
+}
+
+/// Time that the bus thread rests [ms], while the servo takes the ticks from `begin` on.
+double RestOf(HapticsNode* node, const std::function<void()>& meanwhile) {
+  const std::int64_t begin = runtime::MonotonicNs();
+  std::jthread other(meanwhile);
+  node->Rest();
+  return 1e-6 * static_cast<double>(runtime::MonotonicNs() - begin);
+}
+
+TEST_F(HapticsNodeTest, ARestEndsWhenAToolMovesOrAMessageArrivesOrASampleIsDue) {
+  const Vec3f place(0, 0, 0.02f);
+  const std::array<ScriptKey, 3> late{
+      {{0.0f, 0, place, 0, 0, 0}, {0.5f, 0, place, 0, 0, 0}, {1.0f, 0, {0, 0, 0.01f}, 0, 0, 0}}};
+  scene.script = late;
+  const auto published = bus.tools.MakeInput(1024);
+  node = Make(1000);
+  // Stamps of the far future: the next sample is due in an hour, so nothing but an event ends a rest.
+  const std::int64_t later_ns = runtime::MonotonicNs() + 3'600'000'000'000;
+  const auto tick_at = [later_ns](std::uint64_t ms) {
+    Tick tick = TickAt(ms);
+    tick.stamp_ns += later_ns;
+    return tick;
+  };
+  std::uint64_t ms = 0;
+  for (; ms < 400 || !node->rests(); ++ms) {
+    ASSERT_LT(ms, 450u);
+    node->BusStep();
+    node->ServoStep(tick_at(ms));
+  }
+  const double by_message = RestOf(node.get(), [&] {
+    for (const std::uint64_t end = ms + 9; ms < end; ++ms) node->ServoStep(tick_at(ms));  // Nothing moves.
+    std::this_thread::sleep_for(std::chrono::milliseconds(30));
+    bus.bell->Ring();
+  });
+  EXPECT_GE(by_message, 30) << "ticks without motion end no rest";
+  node->BusStep();
+  ToolState state;
+  while (published->TakeNext(&state)) {
+  }
+  const double by_motion = RestOf(node.get(), [&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    for (; ms < 515; ++ms) node->ServoStep(tick_at(ms));
+  });
+  EXPECT_LT(by_motion, 5'000);
+  node->BusStep();
+  EXPECT_FALSE(node->rests());
+  // A reader that interpolates between the last sample at rest and the first moved one does not begin too early.
+  std::vector<ToolState> states;
+  while (published->TakeNext(&state)) states.push_back(state);
+  const auto moved = std::ranges::find_if(states, [&](const ToolState& s) { return s.tools[0].p_WT != place; });
+  ASSERT_NE(moved, states.end());
+  ASSERT_NE(moved, states.begin());
+  EXPECT_GE(std::prev(moved)->stamp.stamp_ns, tick_at(499).stamp_ns - 1'000'000);
+  EXPECT_LT(moved->stamp.stamp_ns, tick_at(510).stamp_ns);
+}
+
+TEST_F(HapticsNodeTest, ARestIsNoLongerThanUntilTheNextSample) {
+  const std::array<ScriptKey, 1> still{{{0.0f, 0, {0, 0, 0.02f}, 0, 0, 0}}};
+  scene.script = still;
+  node = Make(1000);
+  const std::int64_t now_ns = runtime::MonotonicNs();
+  for (std::uint64_t ms = 0; ms < 400; ++ms) {
+    Tick tick = TickAt(ms);
+    tick.stamp_ns = now_ns + static_cast<std::int64_t>(ms) * 1'000'000 - 300'000'000;
+    node->ServoStep(tick);
+    node->BusStep();
+  }
+  ASSERT_TRUE(node->rests());
+  const double rest_ms = RestOf(node.get(), [] {});
+  // The newest tick is 99 ms ahead of the clock, and the next sample at most ten ticks after it.
+  EXPECT_GT(rest_ms, 60);
+  EXPECT_LT(1e-6 * static_cast<double>(runtime::MonotonicNs() - now_ns), 5'000);
 }
 
 TEST_F(HapticsNodeTest, WhatDoesNotPassTheGateIsCounted) {

@@ -22,8 +22,10 @@ struct NodeBus {
   std::unique_ptr<bus::Output<TickManifest>> manifest_out = manifests.MakeOutput();
   std::unique_ptr<bus::Input<TickManifest>> manifest_in = manifests.MakeInput(64);
 
+  std::shared_ptr<Bell> bell = std::make_shared<Bell>();
+
   /// The node's.
-  [[nodiscard]] HapticsNode::Ports ports() const { return {*model_in, *operator_in, *tool_out, *manifest_out}; }
+  [[nodiscard]] HapticsNode::Ports ports() const { return {*model_in, *operator_in, *tool_out, *manifest_out, bell}; }
 };
 
 }  // namespace fulcrum::haptics::testing

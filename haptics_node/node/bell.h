@@ -1,0 +1,34 @@
+// Wakes the bus thread from its rest.
+#pragma once
+
+#include <semaphore.h>
+
+#include <cstdint>
+#include <ctime>
+
+namespace fulcrum::haptics {
+
+/// Ring() may be called on any thread, also the servo's: it neither waits nor allocates.
+class Bell {
+ public:
+  Bell() { ::sem_init(&semaphore_, 0, 0); }
+  ~Bell() { ::sem_destroy(&semaphore_); }
+  Bell(const Bell&) = delete;
+  Bell& operator=(const Bell&) = delete;
+
+  void Ring() noexcept { ::sem_post(&semaphore_); }
+
+  /// Waits until Ring() has been called since the last wait, at most until `until_ns` (CLOCK_MONOTONIC). One thread.
+  void WaitUntil(std::int64_t until_ns) {
+    constexpr std::int64_t kSecond_ns = 1'000'000'000;
+    const timespec until{static_cast<time_t>(until_ns / kSecond_ns), static_cast<long>(until_ns % kSecond_ns)};
+    if (::sem_clockwait(&semaphore_, CLOCK_MONOTONIC, &until) != 0) return;
+    while (::sem_trywait(&semaphore_) == 0) {  // Further calls since then.
+    }
+  }
+
+ private:
+  sem_t semaphore_;
+};
+
+}  // namespace fulcrum::haptics
