@@ -14,44 +14,33 @@
 
 namespace {
 
-using fulcrum::Tick;
+using namespace fulcrum;  // NOLINT: a main is nothing but names of other modules
 
 // The bus thread runs below the servo, above the nodes at 100 Hz.
 constexpr int kPriorityBelowServo = 20;
-/// It rests for at most this often in a row, then looks whether it is to end.
-constexpr int kMostRests = 20;
 
-fulcrum::ExitCode RunHaptics(fulcrum::app::NodeApp& app) {
-  fulcrum::haptics::CartDevices cart =
-      fulcrum::haptics::MakeCartDevices(app.cart(), app.scene(), fulcrum::haptics::TrocarFolder());
-  for (const std::string& note : cart.notes) Log(fulcrum::runtime::LogLevel::kInfo, note);
+ExitCode RunHaptics(app::NodeApp& app) {
+  haptics::CartDevices cart = haptics::MakeCartDevices(app.cart(), app.scene(), haptics::TrocarFolder());
+  for (const std::string& note : cart.notes) Log(runtime::LogLevel::kInfo, note);
   if (cart.touch) cart.touch->Start();
-  const auto bell = std::make_shared<fulcrum::haptics::Bell>();  // The ports outlive the node.
+  const auto bell = std::make_shared<haptics::Bell>();  // The ports outlive the node.
   const auto ring = [bell] { bell->Ring(); };
-  fulcrum::haptics::HapticsNode node(
-      app.scene(), std::move(cart.devices),
-      {app.MakeInput<fulcrum::ContactModel>(ring), app.MakeInput<fulcrum::OperatorInput>(ring),
-       app.MakeOutput<fulcrum::ToolState>(), app.MakeOutput<fulcrum::TickManifest>(), bell},
-      fulcrum::runtime::MonotonicNs());
+  haptics::HapticsNode node(app.scene(), std::move(cart.devices),
+                            {app.MakeInput<ContactModel>(ring), app.MakeInput<OperatorInput>(ring),
+                             app.MakeOutput<ToolState>(), app.MakeOutput<TickManifest>(), bell},
+                            runtime::MonotonicNs());
 
-  fulcrum::runtime::CyclicThreadSettings servo = app.timing();
-  fulcrum::runtime::CyclicThreadSettings below = servo;
+  runtime::CyclicThreadSettings servo = app.timing();
+  runtime::CyclicThreadSettings below = servo;
   below.name = "haptics_bus";
   below.fifo_priority = std::max(0, servo.fifo_priority - kPriorityBelowServo);
   below.spin_ns = 0;
   below.cpu = -1;
   servo.rests = node.resting();
-  fulcrum::runtime::CyclicThread bus(below, [&](const Tick&) {
-    node.BusStep();
-    for (int i = 0; i < kMostRests && node.rests(); ++i) {
-      node.Rest();
-      node.BusStep();
-    }
-  });
+  runtime::CyclicThread bus(below, [&](const Tick&) { node.BusTurn(); });
   bus.Start();
   return app.Run(
-      servo, [&](const Tick& tick) { node.ServoStep(tick); },
-      [&](fulcrum::Health* health) { node.FillHealth(health); });
+      servo, [&](const Tick& tick) { node.ServoStep(tick); }, [&](Health* health) { node.FillHealth(health); });
 }
 
 }  // namespace

@@ -103,6 +103,15 @@ void HapticsNode::BusStep() {
   rests_.store(IsAtRest(), std::memory_order_relaxed);
 }
 
+void HapticsNode::BusTurn() {
+  constexpr int kMostRests = 20;  // Then the thread looks whether it is to end.
+  BusStep();
+  for (int i = 0; i < kMostRests && rests(); ++i) {
+    Rest();
+    BusStep();
+  }
+}
+
 bool HapticsNode::IsAtRest() const {
   constexpr std::size_t kSettled_ticks = 100;
   return thinner_.still_ticks() >= kSettled_ticks &&

@@ -50,6 +50,9 @@ class HapticsNode {
   /// or a test, call it before and after ServoStep() on one thread.
   void BusStep();
 
+  /// BusStep(), and while the node rests, for at most 0.2 s, Rest() and BusStep() in turn. Bus thread.
+  void BusTurn();
+
   /// No tool has moved for a tenth of a second and none is near tissue. Bus thread.
   [[nodiscard]] bool rests() const { return rests_.load(std::memory_order_relaxed); }
   /// The same, for any thread.
