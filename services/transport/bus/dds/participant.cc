@@ -44,7 +44,7 @@ const Duration_t kSecuredAnnouncement{0, 100 * kMilli_ns};
 /// Delay after which a reader requests the samples for late joiners; the first heartbeat may have come before the
 /// match.
 const Duration_t kFirstAcknack{0, 10 * kMilli_ns};
-/// Period of the heartbeats of a reliable writer whose history outlasts it. The library sends one with each sample of a
+/// Period of the heartbeats of CauteryContact, whose history outlasts it. The library sends one with each sample of a
 /// full history, and each reader answers each heartbeat.
 const Duration_t kStreamHeartbeat{0, 50 * kMilli_ns};
 /// The period of a node is at least 10 ms wherever a reliable write can block.
@@ -274,7 +274,8 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
   fast::Topic* topic = impl_->TopicFor<T>();
   fast::DataWriterQos qos;
   Apply(role.quality, role.quality.writer_depth, impl_->SharedMemoryFor(role), &qos);
-  if (role.quality.delivery == Delivery::kReliable && role.quality.writer_depth >= kOutage) {
+  // Not for TickManifest: a standby takes over 35 ms after the newest one, so a lost one must be repaired sooner.
+  if (role.id == TopicId::kCauteryContact) {
     qos.reliable_writer_qos().disable_heartbeat_piggyback = true;
     qos.reliable_writer_qos().times.heartbeatPeriod = kStreamHeartbeat;
   }
