@@ -19,6 +19,9 @@ constexpr std::size_t kVertices = 2 * kRows + 3;  // Of a section: both surfaces
 constexpr float kLeast_rad = 0.25f, kByDamage_rad = 1.3f, kVaried_rad = 1.0f;
 constexpr int kFramePasses = 12;         // A standard deviation of 1 mm along the lip.
 constexpr float kVariation_m = 0.0016f;  // Length over which it varies.
+constexpr float kFreeStep_m = 0.0001f;   // Of the search for the next cut.
+// Texels that are removed have no colour of tissue: that of the wall is taken from this far beside them.
+constexpr float kInTissue_m = 0.00015f;
 
 float EaseBetween(float low, float high, float value) {
   const float u = std::clamp((value - low) / (high - low), 0.0f, 1.0f);
@@ -68,13 +71,11 @@ void CutLip::Find(const Atlas& atlas, const MembraneMesh& mesh, const SheetPlace
       if (!beside) continue;
       station.drawn = true;
       station.edge = places.Continued(mesh, *beside, point.material);
-      const Vec2f inner = point.material + kWidth_m * point.inward;
-      // Where tissue is narrower than the lip, the inner border would lie beyond the next cut.
-      bool whole = true;
-      for (const float share : {0.4f, 0.7f, 1.0f}) {
-        whole = whole && !atlas.Removed(point.material + share * kWidth_m * point.inward);
-      }
-      const auto found = whole ? places.Find(mesh, inner) : std::nullopt;
+      float free = 2 * kFreeStep_m;
+      while (free < 2 * kWidth_m && !atlas.Removed(point.material + free * point.inward)) free += kFreeStep_m;
+      station.width_m = std::min(kWidth_m, 0.5f * free);
+      const Vec2f inner = point.material + station.width_m * point.inward;
+      const auto found = places.Find(mesh, inner);
       station.inner = found ? *found : places.Continued(mesh, *beside, inner);
       station.thickness_m = thickness_[mesh.NodeOf(beside->vertices[0]) / cols_];
     }
@@ -83,8 +84,10 @@ void CutLip::Find(const Atlas& atlas, const MembraneMesh& mesh, const SheetPlace
   Curl(atlas);
 }
 
-void CutLip::Curl(const Atlas& atlas) {
+bool CutLip::Curl(const Atlas& atlas) {
+  bool changed = false;
   for (Station& station : stations_) {
+    const float before = station.curl_rad;
     float damage = 0;
     for (const float depth_m : {0.0002f, 0.0004f, 0.0006f}) {
       const auto texel = atlas.At(station.at.material + depth_m * station.at.inward);
@@ -93,7 +96,9 @@ void CutLip::Curl(const Atlas& atlas) {
     }
     station.curl_rad = std::max(0.15f, kLeast_rad + kByDamage_rad * EaseBetween(0.05f, 0.8f, damage) +
                                            kVaried_rad * (Variation(station.at.material) - 0.5f));
+    changed = changed || station.curl_rad != before;
   }
+  return changed;
 }
 
 void CutLip::Place(const MembraneMesh& mesh) {
@@ -113,20 +118,23 @@ void CutLip::Place(const MembraneMesh& mesh) {
     }
     section.frame = place * material.inverse();
     section.inner = station.inner.Of(mesh.positions());
+    section.material = station.at.material + station.width_m * station.at.inward;
     // Of the part of the sheet that the contour belongs to; not finite: not valid.
     const float apart = (station.edge.Of(mesh.positions()) - section.inner).norm();
-    section.valid = apart < kMostStretch * kWidth_m && section.frame.squaredNorm() < kMostStretch * kMostStretch;
+    section.valid = apart < kMostStretch * station.width_m && section.frame.squaredNorm() < kMostStretch * kMostStretch;
   }
   // Parts of neighbouring triangles continue the sheet each in its own plane, but a lip is one piece: what it continues
-  // is their mean. Not of the positions, which would close the ends of the slit.
+  // is their mean. Not of the positions, which would close the ends of the slit: of what each continues to.
   Smooth(kFramePasses,
          [](const Section& a, const Section& c, Section* b) { b->frame = 0.25f * (a.frame + 2 * b->frame + c.frame); });
-  Smooth(2,
-         [](const Section& a, const Section& c, Section* b) { b->inner = 0.25f * (a.inner + 2 * b->inner + c.inner); });
+  Smooth(2, [](const Section& a, const Section& c, Section* b) {
+    const auto continued = [b](const Section& from) { return from.inner + b->frame * (b->material - from.material); };
+    b->inner = 0.25f * (continued(a) + 2 * b->inner + continued(c));
+  });
   for (std::size_t k = 0; k < stations_.size(); ++k) {
     Section& section = sections_[k];
-    section.edge = section.inner - section.frame * (kWidth_m * stations_[k].at.inward);
-    section.valid = section.valid && (section.edge - section.inner).norm() > 0.1f * kWidth_m;
+    section.edge = section.inner - section.frame * (stations_[k].width_m * stations_[k].at.inward);
+    section.valid = section.valid && (section.edge - section.inner).norm() > 0.1f * stations_[k].width_m;
   }
 }
 
@@ -151,7 +159,8 @@ void CutLip::AppendSection(const Station& station, const Section& section, const
   const Vec3f o = across / width;
   Vec3f n = normal - normal.dot(o) * o;
   n = n.squaredNorm() > 1e-6f ? n.normalized() : o.unitOrthogonal();
-  const float flat = width * kLipFlat_m / kWidth_m, curl = std::min(width - flat, kCurl_m);
+  const float share_of_flat = kLipFlat_m / kWidth_m;
+  const float flat = width * share_of_flat, curl = std::min(width - flat, kCurl_m);
   const float half = 0.5f * station.thickness_m, radius = curl / station.curl_rad;
   std::array<Vec3f, kRows> centre, up;
   for (std::size_t row = 0; row < kRows; ++row) {
@@ -160,8 +169,8 @@ void CutLip::AppendSection(const Station& station, const Section& section, const
     up[row] = std::cos(a) * n - std::sin(a) * o;
   }
   const auto material = [&](std::size_t row) {
-    const float beside_m = row == 0 ? kWidth_m : kCurl_m * (1 - static_cast<float>(row - 1) / kArc);
-    return Vec2f(station.at.material + beside_m * station.at.inward);
+    const float share = row == 0 ? 1.0f : (1 - share_of_flat) * (1 - static_cast<float>(row - 1) / kArc);
+    return Vec2f(station.at.material + std::max(kInTissue_m, share * station.width_m) * station.at.inward);
   };
   const auto opacity = [](std::size_t row) { return row == 0 ? 0.0f : 1.0f; };
   // Flush with the sheet where the lip begins.

@@ -8,8 +8,9 @@
 //   ──────────┘
 //   I     sheet's surface +- half its thickness
 //
-// The sheet itself ends where the curl begins (kLipNearness): there membrane.frag, fat.frag and the ground truth of a
-// data set show nothing of it. The flat part of the lip overlaps it.
+// The sheet itself ends where the curl begins (kLipNearness): there membrane.frag and the ground truth of a data set
+// show nothing of it. The flat part of the lip overlaps it. Between two cuts that are near each other, each lip has
+// half of the tissue's width.
 #pragma once
 
 #include <array>
@@ -24,8 +25,13 @@ namespace fulcrum::render {
 
 inline constexpr float kCurl_m = 0.0009f;     ///< Width of the tissue that curls, in the sheet's own coordinates.
 inline constexpr float kLipFlat_m = 0.0005f;  ///< Width of the flat part beside it.
-/// Atlas::Nearness at which the curl begins; as in membrane.frag and fat.frag.
+/// Atlas::Nearness at which the curl begins; as in membrane.frag.
 inline constexpr float kLipNearness = 1 - kCurl_m / Atlas::kRim_m;
+
+/// False for the paper's picture as printed: it cuts no holes in the texture.
+[[nodiscard]] inline bool DrawsCuts(const SceneView& scene) {
+  return !(scene.thermal.model == ThermalModel::kPaper && scene.thermal.as == PaperForm::kPrinted);
+}
 
 /// What is drawn of cuts. coordinate: (s, t) [m], part, opacity.
 struct CutGeometry {
@@ -57,8 +63,8 @@ class CutLip {
 
   /// Finds the lips anew, after a change of what is removed or of the topology. @pre places.SetTopology(mesh)
   void Find(const Atlas& atlas, const MembraneMesh& mesh, const SheetPlaces& places);
-  /// Takes the curl from the damage beside the contours.
-  void Curl(const Atlas& atlas);
+  /// Takes the curl from the damage beside the contours; false if it is as it was.
+  bool Curl(const Atlas& atlas);
   /// Appends the lips as `mesh` lies. What is not finite, or stretched to more than kMostStretch times its width, is
   /// left out.
   void Append(const MembraneMesh& mesh, CutGeometry* out);
@@ -73,12 +79,14 @@ class CutLip {
     SheetPlace edge, inner;
     ContourPoint at;
     float thickness_m = 0;
+    float width_m = 0;  // Of curl and flat part.
     float curl_rad = 0;
     std::size_t next = 0;  // Of the contour; itself: none.
     bool drawn = false;
   };
   struct Section {
     Vec3f edge, inner;
+    Vec2f material;                    // Of the inner border.
     Eigen::Matrix<float, 3, 2> frame;  // d(position)/d(s, t) beside the contour.
     bool valid = false;
   };

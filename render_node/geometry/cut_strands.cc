@@ -57,8 +57,9 @@ std::optional<Vec2f> ContourFrom(const Atlas& atlas, const Vec2f& from, const Ve
   return std::nullopt;
 }
 
-/// A strand's points with a ribbon's half width around them, to the eye.
-void AppendStrand(std::span<const Vec3f> points, std::span<const float> half_m, const Vec2f& from, const Vec2f& to,
+/// A strand's points with a ribbon's half width around them, to the eye. It looks as the tissue does where it begins:
+/// between its anchors none is left.
+void AppendStrand(std::span<const Vec3f> points, std::span<const float> half_m, const Vec2f& material,
                   const Vec3f& eye_W, float pixels_per_rad, CutGeometry* out) {
   const auto first = static_cast<Index>(out->positions.size());
   for (std::size_t k = 0; k < points.size(); ++k) {
@@ -70,7 +71,6 @@ void AppendStrand(std::span<const Vec3f> points, std::span<const float> half_m, 
     const Vec3f side = across.squaredNorm() > 1e-16f ? across.normalized() : facing.unitOrthogonal();
     const float least = 0.5f * distance / pixels_per_rad, half = std::max(half_m[k], least);
     const float opacity = 0.8f * std::max(kLeastOpacity, half_m[k] / half);
-    const Vec2f material = from + static_cast<float>(k) / static_cast<float>(points.size() - 1) * (to - from);
     for (const float sign : {-1.0f, 1.0f}) {
       // Round in the light.
       out->Add(points[k] + sign * half * side, (facing + 0.8f * sign * side).normalized(), material,
@@ -179,7 +179,7 @@ void CutStrands::Append(const MembraneMesh& mesh, const Vec3f& eye_W, float pixe
         const float spread = 1 + 1.6f * std::exp(-9 * std::min(u, 1 - u));
         half[k] = 0.5f * strand.thickness_m * thin * spread;
       }
-      AppendStrand(points, half, strand.material_a, strand.material_b, eye_W, pixels_per_rad, out);
+      AppendStrand(points, half, strand.material_a, eye_W, pixels_per_rad, out);
       continue;
     }
     // Each end curls back, the shorter the farther the lips are apart.
@@ -197,10 +197,8 @@ void CutStrands::Append(const MembraneMesh& mesh, const Vec3f& eye_W, float pixe
         points[k] = at;
         half[k] = 0.5f * strand.thickness_m * (1.3f - 0.9f * u);
       }
-      const Vec2f &from = sign > 0 ? strand.material_a : strand.material_b,
-                  &to = sign > 0 ? strand.material_b : strand.material_a;
-      AppendStrand(std::span(points).first(kHalf), std::span(half).first(kHalf), from, from + 0.2f * (to - from), eye_W,
-                   pixels_per_rad, out);
+      AppendStrand(std::span(points).first(kHalf), std::span(half).first(kHalf),
+                   sign > 0 ? strand.material_a : strand.material_b, eye_W, pixels_per_rad, out);
     }
   }
 }

@@ -178,7 +178,14 @@ void SheetFluid::FindShape(Cell cell) {
   if (atlas_ != nullptr && atlas_->removals() > 0) {
     // Its index counts the border around the sheet.
     const Vec2f middle(static_cast<float>(cell % row) - 0.5f, static_cast<float>(cell / row) - 0.5f);
-    if (atlas_->Removed(cell_m_ * middle)) place_[cell].z() -= kSlit_m;
+    // Of a slit that is narrower than a cell no middle need be removed.
+    bool cut = false;
+    for (const float x : {-0.375f, -0.125f, 0.125f, 0.375f}) {
+      for (const float y : {-0.375f, -0.125f, 0.125f, 0.375f}) {
+        cut = cut || atlas_->Removed(cell_m_ * (middle + Vec2f(x, y)));
+      }
+    }
+    if (cut) place_[cell].z() -= kSlit_m;
   }
   level_[cell] = place_[cell].z();
 }

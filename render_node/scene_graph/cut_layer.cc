@@ -30,18 +30,21 @@ void CutLayer::EndRehearsal(osg::Geode* parent) {
   rehearsal_.reset();
 }
 
-void CutLayer::Update(const Atlas& atlas, const MembraneMesh& mesh, bool recut, const Vec3f& eye_W,
+bool CutLayer::Update(const Atlas& atlas, const MembraneMesh& mesh, bool recut, bool moved, const Vec3f& eye_W,
                       float pixels_per_rad, FieldOfView* field, osg::Geode* parent) {
-  if (atlas.removals() == 0) return;
+  if (atlas.removals() == 0) return false;
+  bool changed = recut || moved || !mesh_;
   if (recut || !mesh_) places_.SetTopology(mesh);
   if (recut || atlas.removals() != removals_) {
     lip_.Find(atlas, mesh, places_);
     strands_.Find(atlas, mesh, places_);
-  } else if (atlas.patches() != patches_) {
-    lip_.Curl(atlas);
+    changed = true;
+  } else if (atlas.patches() != patches_ && lip_.Curl(atlas)) {
+    changed = true;
   }
   removals_ = atlas.removals();
   patches_ = atlas.patches();
+  if (!changed) return false;
   if (!mesh_) {
     mesh_ = MakeMesh();
     parent->addDrawable(mesh_->geometry());
@@ -53,6 +56,7 @@ void CutLayer::Update(const Atlas& atlas, const MembraneMesh& mesh, bool recut, 
   mesh_->SetNormals(geometry_.normals);
   mesh_->SetCoordinates(geometry_.coordinates);
   if (field->Find(geometry_.positions, geometry_.triangles, Sides::kBoth, &seen_)) mesh_->SetTriangles(seen_);
+  return true;
 }
 
 }  // namespace fulcrum::render

@@ -23,14 +23,12 @@ class CutLayer {
   void Rehearse(const std::array<Vec3f, 3>& corners, const Vec3f& normal, osg::Geode* parent);
   void EndRehearsal(osg::Geode* parent);
 
-  /// Whether the atlas has changed so that Update() would draw something else.
-  [[nodiscard]] bool HasChanged(const Atlas& atlas) const {
-    return atlas.removals() != removals_ || (!lip_.empty() && atlas.patches() != patches_);
-  }
-  /// Follows `mesh` and `atlas`. The first cut adds the drawing to `parent`.
+  /// Follows `mesh` and `atlas`. The first cut adds the drawing to `parent`. Returns false, and does nothing, if what
+  /// is drawn is the same.
   /// @param recut    the topology of `mesh` has changed since the last call.
-  void Update(const Atlas& atlas, const MembraneMesh& mesh, bool recut, const Vec3f& eye_W, float pixels_per_rad,
-              FieldOfView* field, osg::Geode* parent);
+  /// @param moved    `mesh`, `eye_W` or `pixels_per_rad` has changed.
+  bool Update(const Atlas& atlas, const MembraneMesh& mesh, bool recut, bool moved, const Vec3f& eye_W,
+              float pixels_per_rad, FieldOfView* field, osg::Geode* parent);
 
  private:
   [[nodiscard]] std::unique_ptr<Mesh> MakeMesh();

@@ -268,12 +268,12 @@ void LaparoscopeView::SetTool(int tool, const ToolSample& sample) {
   impl_->instruments.SetPose(tool, sample);
   impl_->tools[static_cast<std::size_t>(tool)] = sample;
   impl_->tools_moved = true;
-  impl_->optics.SceneChanged();
+  impl_->optics.EdgesChanged();
 }
 
 void LaparoscopeView::SetJaw(int tool, float angle_rad) {
   impl_->instruments.SetJaw(tool, angle_rad);
-  impl_->optics.SceneChanged();
+  impl_->optics.EdgesChanged();
 }
 
 void LaparoscopeView::SetFlow(int tool, TubeFlow flow, double session_time_s) {
@@ -311,7 +311,10 @@ void LaparoscopeView::SetDetail(float factor) { impl_->layers.SetDetail(factor);
 
 void LaparoscopeView::SetSoil(float soil) { impl_->optics.SetSoil(soil); }
 
-void LaparoscopeView::SetScale(float scale) { impl_->optics.SetScale(scale); }
+void LaparoscopeView::SetScale(float scale) {
+  impl_->optics.SetScale(scale);
+  impl_->layers.SetScale(scale);
+}
 
 void LaparoscopeView::SetMostScale(float most) { impl_->optics.SetMostScale(most); }
 

@@ -311,6 +311,7 @@ void Optics::UseScale() {
   reach_->set(EdgeLines::kReach / share.y());
   pixel_->set(osg::Vec2(used.x() / static_cast<float>(width_), used.y() / static_cast<float>(height_)));
   UseLens();
+  edges_changed_ = true;
   BackgroundsChanged();
 }
 
@@ -321,7 +322,7 @@ void Optics::SetEyes(std::span<const Laparoscope> eyes) {
     eye.light_position->set(osg::Vec3(seen.light_position.x(), seen.light_position.y(), seen.light_position.z()));
     eye.seen = seen;
   }
-  SceneChanged();
+  EdgesChanged();
 }
 
 void Optics::Eye::Look() {
@@ -352,7 +353,7 @@ void Optics::Eye::Look() {
 
 void Optics::SetEdges(FindEdges find) {
   find_edges_ = std::move(find);
-  SceneChanged();
+  EdgesChanged();
 }
 
 void Optics::UpdateEdges() {
@@ -396,8 +397,12 @@ void Optics::UseLens() {
   for (const Eye& eye : eyes_) eye.field->setAttributeAndModes(lens);
 }
 
-void Optics::SceneChanged() {
+void Optics::EdgesChanged() {
   edges_changed_ = true;
+  SceneChanged();
+}
+
+void Optics::SceneChanged() {
   for (Eye& eye : eyes_) {
     if (eye.smoothed) eye.smoothed->Changed();
     eye.Draw();

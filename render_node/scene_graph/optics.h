@@ -58,6 +58,8 @@ class Optics {
   void SetLight(const Vec3f& light);
   /// Must be called when the scene has changed since its last picture.
   void SceneChanged();
+  /// The same where what SetEdges finds has changed as well.
+  void EdgesChanged();
   [[nodiscard]] osg::Group* node() const { return node_; }
 
  private:

@@ -145,7 +145,7 @@ void TissueLayers::AddSheets() {
     layer->mesh->state()->addUniform(new osg::Uniform("behind", kFatBehind));
   }
   Add(&sheet_, "membrane", Order::kMembrane,
-      MakeProgram("surface.vert", "membrane.frag", ShowsCuts() ? "" : "AS_PRINTED"));
+      MakeProgram("surface.vert", "membrane.frag", DrawsCuts(scene_) ? "" : "AS_PRINTED"));
   Blend(sheet_.mesh->state());
   sheet_.mesh->state()->addUniform(new osg::Uniform("fascia_depth", kFasciaDepth));
   const auto around = SurroundingColour(SurfaceRole::kRetroperitoneum);
@@ -184,7 +184,7 @@ bool TissueLayers::SetTopology(const TopologyState& topology) {
   if (!membrane_.SetTopology(topology)) {
     return false;
   }
-  topology_changed_ = true;
+  topology_changed_ = recut_ = true;
   return true;
 }
 
@@ -192,6 +192,11 @@ void TissueLayers::SetEyes(std::span<const Laparoscope> eyes) {
   field_ = FieldOfView(eyes);
   eye_W_ = MiddleOf(eyes);
   pixels_per_rad_ = PixelsPerRad(eyes.front());
+  scope_changed_ = true;
+}
+
+void TissueLayers::SetScale(float scale) {
+  scale_ = scale;
   scope_changed_ = true;
 }
 
@@ -227,19 +232,18 @@ void TissueLayers::RehearseBurn(bool on) {
   const Vec3f normal = (eye_W_ - middle).normalized();
   const Vec3f u = kHalf_m * normal.unitOrthogonal(), v = normal.cross(u);
   const std::array<Vec3f, 3> corners{middle - u - v, middle + u - v, middle + v};
-  if (ShowsCuts()) cut_.Rehearse(corners, normal, geode_);
+  if (DrawsCuts(scene_)) cut_.Rehearse(corners, normal, geode_);
   if (SolidsBurn(scene_)) burn_.Rehearse(corners, normal, geode_);
 }
 
 bool TissueLayers::Update(const Atlas& atlas) {
-  const bool recut = ShowsCuts() && cut_.HasChanged(atlas);
-  if (!tissue_changed_ && !topology_changed_ && !scope_changed_ && !recut && !burn_.grown()) {
-    return false;
-  }
-  UpdateMembrane();
-  if (ShowsCuts()) {
-    cut_.Update(atlas, membrane_, topology_changed_, eye_W_, detail_factor_ * pixels_per_rad_, &field_, geode_);
-  }
+  const bool moved = tissue_changed_ || topology_changed_ || scope_changed_ || burn_.grown();
+  if (moved) UpdateMembrane();
+  // A patch alone changes lips at most.
+  const bool cut_changed = DrawsCuts(scene_) && cut_.Update(atlas, membrane_, recut_, moved, eye_W_,
+                                                            std::min(scale_, 1.0f) * pixels_per_rad_, &field_, geode_);
+  recut_ = false;
+  if (!moved) return cut_changed;
   UpdateFat();
   if (tissue_changed_ || scope_changed_) {
     if (tissue_changed_) UpdateSolids();
@@ -255,10 +259,6 @@ bool TissueLayers::Update(const Atlas& atlas) {
   burn_.Update(solid_positions_, solid_normals_, &field_);
   tissue_changed_ = topology_changed_ = scope_changed_ = false;
   return true;
-}
-
-bool TissueLayers::ShowsCuts() const {
-  return !(scene_.thermal.model == ThermalModel::kPaper && scene_.thermal.as == PaperForm::kPrinted);
 }
 
 void TissueLayers::UpdateSolids() {

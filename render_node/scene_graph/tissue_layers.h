@@ -35,6 +35,8 @@ class TissueLayers {
   void SetEyes(std::span<const Laparoscope> eyes);
   /// Draws the membrane in so many triangles as a picture with `factor` times as many lines needs; 1 at first.
   void SetDetail(float factor);
+  /// Pixels of the scene as a share of those of the picture: no strand is thinner than one of them.
+  void SetScale(float scale);
   /// Draws a triangle of the fat if one of its corners is bared, `opened` or `visible`, as a function of (s, t) [m] and
   /// thickness 0 … 1; with lobules if one is bared or opened.
   void ShowFat(const std::function<bool(const Vec2f& material, float thickness)>& visible,
@@ -66,7 +68,6 @@ class TissueLayers {
     std::vector<Triangle> triangles;  ///< Of its own vertices.
   };
   /// False where the paper's colours are drawn to the letter: they have no holes.
-  [[nodiscard]] bool ShowsCuts() const;
   void AddSolids();
   void AddSolid(const fulcrum::Solid& solid);  // Not the one of geometry/solid.h.
   void AddSheets();
@@ -94,7 +95,9 @@ class TissueLayers {
   bool fat_chosen_ = false, rehearsing_ = false;
   std::vector<Triangle> chosen_;  // Scratch: triangles of the membrane at the level of detail that is needed.
   const std::vector<float> rim_;  // Per node of the membrane's grid (geometry/sheet_rim.h).
+  float scale_ = 1;
   bool tissue_changed_ = true, topology_changed_ = true, scope_changed_ = true;
+  bool recut_ = false;  // By a new topology.
   osg::ref_ptr<osg::Geode> geode_ = new osg::Geode;
   osg::ref_ptr<osg::Program> solid_program_;  ///< Of all solids: the rasteriser compiles each program.
   std::vector<SolidLayer> solids_;

@@ -7,6 +7,7 @@ in vec4 coordinate;
 uniform sampler2D atlas;
 uniform sampler2D serosa_pattern;
 uniform vec2 atlas_per_metre;
+uniform float colour_by_temperature;
 out vec4 fragment;
 
 void main() {
@@ -22,6 +23,8 @@ void main() {
   float burnt = clamp(2.0 * heat.b - 1.0, 0.0, 1.0);
 
   vec4 broad = texture(serosa_pattern, m * 31.0);
+  // In the paper's model by the present temperature, as the sheet is.
+  float hot = colour_by_temperature * clamp((127.5 * heat.r - 25.0) / 55.0, 0.0, 1.0);
   vec3 albedo = upper ? vec3(0.85, 0.62, 0.49) : wall ? vec3(0.66, 0.36, 0.26) : vec3(0.70, 0.46, 0.35);
   if (strand) albedo = vec3(0.88, 0.70, 0.55);
   albedo *= 0.70 + 0.3 * noise.r + 0.3 * broad.b;
@@ -33,6 +36,7 @@ void main() {
   albedo = mix(albedo, vec3(0.20, 0.075, 0.025) * (0.5 + noise.b), brown);
   albedo = mix(albedo, vec3(0.035, 0.022, 0.015), smoothstep(0.05, 0.6, burnt + 0.3 * patches * step(0.01, burnt)));
 
+  albedo = mix(albedo, vec3(0.22, 0.075, 0.022), hot);
   float blood = upper || wall ? 2.0 * liquid.r : 0.6 * liquid.r;
   float bloody = smoothstep(0.0, 0.35, blood);
   albedo = mix(ThroughBlood(albedo, blood), kClot * (0.5 + noise.b), 0.85 * bloody * ClotShare(liquid));

@@ -28,8 +28,8 @@ float Coverage(vec2 normal, float distance) {
 void main() {
   vec2 normal = across.xy, one = normal * pixel;
   float distance = across.z;
-  vec2 inner = min(place - one * max(reach + distance, 0.0), texture_most);
-  vec2 outer = min(place + one * max(reach - distance, 0.0), texture_most);
+  vec2 inner = clamp(place - one * max(reach + distance, 0.0), vec2(0.0), texture_most);
+  vec2 outer = clamp(place + one * max(reach - distance, 0.0), vec2(0.0), texture_most);
   vec3 beyond = vec3(0.0);
   if (across.w < 1.5) {
     vec2 texels = vec2(textureSize(scene_depth, 0));

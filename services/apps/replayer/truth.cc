@@ -106,6 +106,7 @@ Moment::Moment(render::LaparoscopeView* view, const render::Laparoscope& from, c
       height(rows),
       surfaces(render::DrawnSurfaces(view->root())),
       atlas(view->atlas()),
+      draws_cuts(render::DrawsCuts(scene)),
       burn(render::DrawnBurn(view->root())) {
   for (std::size_t k = 0; k < kMaxTools; ++k) kinds[k] = scene.tools[k].kind;
   if (burn) burnt = render::BurnCharts(view->burn_atlas(), ChartsOf(*burn));
@@ -123,7 +124,7 @@ Truth::Truth(Moment moment)
     index_[KeyOf(surfaces_[i])] = i;
     classes_.push_back(ClassOfSurface(surfaces_[i], kinds_));
   }
-  Draw(moment.atlas);
+  Draw(moment.atlas, moment.draws_cuts);
   TakeHeat(moment.atlas);
   if (moment.burn) TakeHeatOfSolids(*moment.burn, moment.burnt);
 }
@@ -137,11 +138,11 @@ std::vector<Vec3d> Truth::InCamera(const DrawnSurface& surface) const {
   return positions;
 }
 
-void Truth::Draw(const render::Atlas& atlas) {
+void Truth::Draw(const render::Atlas& atlas, bool draws_cuts) {
   for (std::size_t i = 0; i < surfaces_.size(); ++i) {
     const DrawnSurface& surface = surfaces_[i];
     render::RasterOptions options{.behind_m = surface.behind_m, .cull_back = surface.cull_back};
-    const auto removed = [&atlas](const Corner& at) { return atlas.Removed({at[0], at[1]}); };
+    const auto removed = [&atlas, draws_cuts](const Corner& at) { return draws_cuts && atlas.Removed({at[0], at[1]}); };
     const auto at = [&surface](std::uint32_t triangle, float b1, float b2) {
       return Between(surface.coordinates, surface.triangles[triangle], {0, triangle, b1, b2, 0});
     };
@@ -149,7 +150,8 @@ void Truth::Draw(const render::Atlas& atlas) {
       options.shown = [=, &atlas](std::uint32_t triangle, float b1, float b2) {
         const Corner corner = at(triangle, b1, b2);
         // Beside a cut its lips are shown instead.
-        return corner[2] >= 0 && !removed(corner) && atlas.Nearness({corner[0], corner[1]}) <= render::kLipNearness;
+        if (corner[2] < 0 || removed(corner)) return false;
+        return !draws_cuts || atlas.Nearness({corner[0], corner[1]}) <= render::kLipNearness;
       };
     } else if (surface.name == "fat") {
       options.shown = [=](std::uint32_t triangle, float b1, float b2) {

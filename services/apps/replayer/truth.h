@@ -54,6 +54,7 @@ struct Moment {
   int width, height;
   std::vector<render::DrawnSurface> surfaces;
   render::Atlas atlas;
+  bool draws_cuts = true;                    ///< render::DrawsCuts.
   std::optional<render::DrawnSurface> burn;  ///< Over the solids; none: no burnt chart of them is in the field.
   render::BurnCharts burnt;                  ///< Texels of the charts of `burn`.
 };
@@ -97,7 +98,7 @@ class Truth {
 
  private:
   using Corner = std::array<float, 4>;
-  void Draw(const render::Atlas& atlas);
+  void Draw(const render::Atlas& atlas, bool draws_cuts);
   void TakeHeat(const render::Atlas& atlas);
   void TakeHeatOfSolids(const render::DrawnSurface& burn, const render::BurnCharts& charts);
   void SetHeat(int x, int y, const std::array<std::uint8_t, 4>& texel);

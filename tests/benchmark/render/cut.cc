@@ -14,12 +14,6 @@ namespace {
 
 constexpr double kEnd_s = 20;  // Of the script of built-in: all is cut.
 
-double ProcessMs() {
-  timespec now;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
 class FindLips final : public osg::NodeVisitor {
  public:
   FindLips() : osg::NodeVisitor(TRAVERSE_ALL_CHILDREN) { setNodeMaskOverride(~0u); }
@@ -71,11 +65,11 @@ void CutFigures(const SceneView& scene, benchmark::Report* report) {
   for (int k = 0; k < 2 * repeats + 6; ++k) {
     const bool shown = k % 2 == 0;
     finder.lips->setNodeMask(shown ? ~0u : 0u);
-    const double start = ProcessMs();
+    const double start = CpuMs(CLOCK_PROCESS_CPUTIME_ID);
     view.SetTissue(moment.tissue.xyz);
     view.Update();
     sampled.display->Draw();
-    if (k >= 6) (shown ? with : without).push_back(ProcessMs() - start);
+    if (k >= 6) (shown ? with : without).push_back(CpuMs(CLOCK_PROCESS_CPUTIME_ID) - start);
   }
   const double rest = benchmark::Quantile(without, 0.5) - follow_ms;
   report->Add("render.cut.picture_cpu_ms_p50", benchmark::Quantile(with, 0.5), "ms");

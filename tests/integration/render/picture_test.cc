@@ -260,19 +260,26 @@ TEST_F(PictureTest, LipsAreThereFromTheFirstCutOnAndMadeAnewOnlyAfterAChange) {
   FieldOfView field(std::array{MakeLaparoscope(view_.render)});
   const osg::ref_ptr<osg::Geode> geode = new osg::Geode;
   CutLayer layer(view_);
-  const auto update = [&](bool recut) { layer.Update(atlas, mesh, recut, Vec3f(0, 0, 0.1f), 700, &field, geode); };
-  update(true);
+  const auto update = [&](bool recut, bool moved) {
+    return layer.Update(atlas, mesh, recut, moved, Vec3f(0, 0, 0.1f), 700, &field, geode);
+  };
+  EXPECT_FALSE(update(true, true));
   EXPECT_EQ(geode->getNumDrawables(), 0u);
   mesh.SetTopology(moment.topology);
   mesh.Update(moment.tissue.xyz);
   for (const TemperaturePatch& patch : moment.patches) atlas.Apply(patch);
-  EXPECT_TRUE(layer.HasChanged(atlas));
-  update(true);
+  EXPECT_TRUE(update(true, true));
   EXPECT_EQ(geode->getNumDrawables(), 1u);
-  EXPECT_FALSE(layer.HasChanged(atlas)) << "at rest nothing is made";
+  EXPECT_FALSE(update(false, false)) << "at rest nothing is made";
+  EXPECT_TRUE(update(false, true));
   ASSERT_FALSE(moment.patches.empty());
-  atlas.Apply(moment.patches.front());
-  EXPECT_TRUE(layer.HasChanged(atlas)) << "it may be burnt further";
+  for (const TemperaturePatch& patch : moment.patches) atlas.Apply(patch);
+  EXPECT_FALSE(update(false, false)) << "a patch that changes no damage changes no lip";
+  for (TemperaturePatch patch : moment.patches) {
+    for (std::size_t k = 1; k < patch.texels.size(); k += 4) patch.texels[k] = 255;
+    atlas.Apply(patch);
+  }
+  EXPECT_TRUE(update(false, false)) << "it is burnt further";
 }
 
 TEST_F(PictureTest, InThePapersModelColourFollowsTheTemperatureOfTheMoment) {

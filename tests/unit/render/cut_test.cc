@@ -187,6 +187,54 @@ TEST_F(CutTest, TheLipBeginsWhereTheSheetStillIsDrawnAndReachesTheCut) {
   }
 }
 
+TEST_F(CutTest, TheLipBeginsAtItsPlaceOnTheSheetAlsoAtTheEndsOfTheSlit) {
+  Cut();
+  Open(0);
+  const CutGeometry lips = Lips();
+  ASSERT_FALSE(lips.positions.empty());
+  for (std::size_t k = 0; k < lips.positions.size(); k += 15) {
+    const Vec2f place = lips.positions[k].head<2>(), material(lips.coordinates[k][0], lips.coordinates[k][1]);
+    EXPECT_LT((place - material).norm(), 1e-4f) << material.transpose();
+  }
+}
+
+TEST_F(CutTest, LipsOfTwoCutsShareTheTissueBetweenThem) {
+  Cut();
+  Open(0);
+  // A second slit beside the first, 0.6 mm of tissue between them.
+  TemperaturePatch patch;
+  const float texel = atlas_.texel_m();
+  patch.header.stamp.sequence = 2;
+  const Vec2f corner = Vec2f(Middle() - 0.005f, FirstT() - 0.005f).cwiseMax(0);
+  patch.header.origin_x = static_cast<std::uint32_t>(corner.x() / texel);
+  patch.header.origin_y = static_cast<std::uint32_t>(corner.y() / texel);
+  patch.texels.assign(4u * kPatchTexels * kPatchTexels, 255);
+  const float other = Middle() + 2 * kHalfSlit_m + 0.0006f;
+  for (int y = 0; y < kPatchTexels; ++y) {
+    for (int x = 0; x < kPatchTexels; ++x) {
+      const float s = (static_cast<float>(patch.header.origin_x) + static_cast<float>(x) + 0.5f) * texel;
+      const float t = (static_cast<float>(patch.header.origin_y) + static_cast<float>(y) + 0.5f) * texel;
+      const bool slit = std::abs(s - Middle()) < kHalfSlit_m || std::abs(s - other) < kHalfSlit_m;
+      std::uint8_t* to = &patch.texels[4 * (static_cast<std::size_t>(y) * kPatchTexels + static_cast<std::size_t>(x))];
+      to[1] = to[2] = 0;
+      to[3] = slit && t > FirstT() && t < LastT() ? 0 : 255;
+    }
+  }
+  ASSERT_FALSE(atlas_.Apply(patch).empty());
+  const CutGeometry lips = Lips();
+  const float between = 0.5f * (Middle() + other);
+  int left = 0, right = 0;
+  for (std::size_t k = 0; k < lips.positions.size(); k += 15) {
+    const float inner = lips.coordinates[k][0], edge = lips.coordinates[k + 7][0], t = lips.coordinates[k][1];
+    if (t < FirstT() + 0.002f || t > LastT() - 0.002f || edge < Middle() || edge > other) continue;
+    const bool of_left = edge < between;
+    (of_left ? left : right) += 1;
+    EXPECT_LT(of_left ? inner - between : between - inner, 1.5f * texel);
+  }
+  EXPECT_GT(left, 5);
+  EXPECT_GT(right, 5);
+}
+
 TEST_F(CutTest, DamageCurlsTheLipUp) {
   const auto height = [this] {
     const CutGeometry lips = Lips();
@@ -279,12 +327,12 @@ TEST_F(CutTest, CharredLipsHaveFewStrands) {
   EXPECT_LT(Strands().strands().size(), fresh / 2);
 }
 
-TEST_F(CutTest, TheSameCutGivesTheSameBytesInAnyOrder) {
+TEST_F(CutTest, TheSameCutGivesTheSameBytes) {
   Cut(90);
   Open(0.003f);
   CutGeometry first = Lips();
   Strands().Append(mesh_, eye_W_, kPixelsPerRad, &first);
-  // A process that joins later gets the patch first.
+  // As a process that joins later.
   Atlas late(view_);
   std::swap(late, atlas_);
   Cut(90);
