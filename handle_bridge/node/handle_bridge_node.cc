@@ -14,8 +14,8 @@ constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 /// tick.
 constexpr std::size_t kReadBytes = 512;
 
-/// Longest time between two samples while nothing changes and no pedal is down: short for 0.2 s after a change, so that
-/// a lost sample is repeated, then long.
+/// Longest time between two samples while nothing changes and no pedal is down: short for 0.2 s after a change of more
+/// than kRestingAngle_rad, so that a lost sample is repeated, then long.
 constexpr std::int64_t kShortSilence_ns = 9'000'000, kLongSilence_ns = 39'000'000, kRestsAfter_ns = 200'000'000;
 /// Changes of an angle since the newest sample that are published at once. A count of the converter is 0.03 rad.
 constexpr float kSameAngle_rad = 0.005f;

@@ -3,6 +3,7 @@
 
 #include <semaphore.h>
 
+#include <atomic>
 #include <cstdint>
 #include <ctime>
 
@@ -16,18 +17,20 @@ class Bell {
   Bell(const Bell&) = delete;
   Bell& operator=(const Bell&) = delete;
 
-  void Ring() noexcept { ::sem_post(&semaphore_); }
+  void Ring() noexcept {
+    if (!rung_.exchange(true)) ::sem_post(&semaphore_);
+  }
 
   /// Waits until Ring() has been called since the last wait, at most until `until_ns` (CLOCK_MONOTONIC). One thread.
   void WaitUntil(std::int64_t until_ns) {
     constexpr std::int64_t kSecond_ns = 1'000'000'000;
     const timespec until{static_cast<time_t>(until_ns / kSecond_ns), static_cast<long>(until_ns % kSecond_ns)};
-    if (::sem_clockwait(&semaphore_, CLOCK_MONOTONIC, &until) != 0) return;
-    while (::sem_trywait(&semaphore_) == 0) {  // Further calls since then.
-    }
+    // A call before this store is not counted again: what it tells of is there already.
+    if (::sem_clockwait(&semaphore_, CLOCK_MONOTONIC, &until) == 0) rung_.store(false);
   }
 
  private:
+  std::atomic<bool> rung_{false};  ///< The semaphore has been posted and not been waited for.
   sem_t semaphore_;
 };
 

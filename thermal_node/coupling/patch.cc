@@ -55,7 +55,7 @@ float DrawCells(const TileState& state, const float* __restrict t, int cell, int
     out[n] &= ((flag & kOutside) != 0 ? Texel(255, 255, 0, 255) : ~0u) &
               ((flag & kRemoved) != 0 ? Texel(255, 255, 255, 0) : ~0u);
   }
-  for (int n = 0; n < count; ++n) high[n] = high[n] > t[n] ? high[n] : t[n];
+  for (int n = 0; n < count; ++n) high[n] = t[n] > high[n] ? t[n] : high[n];
   return *std::max_element(high, high + kTile);
 }
 

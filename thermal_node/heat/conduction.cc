@@ -65,12 +65,12 @@ template <bool kMain, bool kAnti, bool kFront>
     const float* __restrict f = &across_s[FaceS(0, j)];
     const float* __restrict smooth = kFront ? &tile->smooth_s[FaceS(0, j)] : nullptr;
     float* __restrict face = &face_s[FaceS(0, j)];
-    for (int i = 0; i <= kTile; ++i) face[i] = FourthOrder<kFront>(f[i - 1], f[i], f[i + 1], gain, smooth + i);
+    for (int i = 0; i <= kTile; ++i) face[i] = FourthOrder<kFront>(f[i - 1], f[i], f[i + 1], gain, kFront ? smooth + i : nullptr);
   }
   const float* __restrict smooth_t = kFront ? &tile->smooth_t[FaceT(0, 0)] : nullptr;
   const float* __restrict f = &across_t[FaceT(0, 0)];
   for (int i = 0; i < (kTile + 1) * kTile; ++i) {
-    face_t[i] = FourthOrder<kFront>(f[i - kTile], f[i], f[i + kTile], gain, smooth_t + i);
+    face_t[i] = FourthOrder<kFront>(f[i - kTile], f[i], f[i + kTile], gain, kFront ? smooth_t + i : nullptr);
   }
   for (int j = 0; j < kTile; ++j) {
     const float* __restrict t = &tile->theta[ThetaIndex(0, j)];

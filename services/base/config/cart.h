@@ -119,7 +119,7 @@ struct NodeTiming {
   double rate_Hz = 100;
   int fifo_priority = 0;  ///< 1 to 99: SCHED_FIFO when permitted; 0: normal scheduling.
   int cpu = -1;           ///< CPU to which the thread is pinned; -1: any.
-  double spin_s = 0;      ///< The thread sleeps until this long before each period, then spins.
+  double spin_s = 0;      ///< Longest time that the thread spins before a period.
   int threads = 1;        ///< Threads that share the work of a period; physics_node only.
 };
 

@@ -79,7 +79,9 @@ void Lock(const std::filesystem::path& file, int fd) {
 }
 
 std::string WhyUnusable(const FileHeader& found, const FileHeader& wanted) {
-  if (found.magic != wanted.magic) return "is no checkpoint";
+  constexpr std::uint64_t kName = 0xffffffffffffull;  // "FULCPK"; the rest of the magic is a version.
+  if ((found.magic & kName) != (wanted.magic & kName)) return "is no checkpoint";
+  if (found.magic != wanted.magic) return "is of another build";
   if (found.scene_hash != wanted.scene_hash) return "is of another scene";
   if (found.layout_version != wanted.layout_version) {
     return "has layout " + std::to_string(found.layout_version) + ", this build reads " +

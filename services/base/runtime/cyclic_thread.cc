@@ -41,9 +41,9 @@ NextPeriod PlanNextPeriod(std::int64_t previous_wake_ns, std::int64_t period_ns,
 }
 
 void SpinMargin::Add(std::int64_t late_ns) {
-  // Steps in the ratio of 19 to 1 balance where one wake-up of twenty is later than the margin. From 50 us down to 20
-  // us takes 750 periods.
-  constexpr std::int64_t kDown_ns = 40, kUp_ns = 19 * kDown_ns;
+  // Steps in the ratio of 99 to 1 balance where one wake-up of a hundred is later than the margin. From 50 us down to
+  // 20 us takes 3,000 periods.
+  constexpr std::int64_t kDown_ns = 10, kUp_ns = 99 * kDown_ns;
   margin_ns_ = std::clamp(margin_ns_ + (late_ns > margin_ns_ ? kUp_ns : -kDown_ns), std::int64_t{0}, longest_ns_);
 }
 

@@ -63,7 +63,7 @@ struct NextPeriod {
 };
 [[nodiscard]] NextPeriod PlanNextPeriod(std::int64_t previous_wake_ns, std::int64_t period_ns, std::int64_t now_ns);
 
-/// Time before a period at which a sleep must end so that the thread is late in one of twenty periods. Pure: follows
+/// Time before a period at which a sleep must end so that the thread is late in one of a hundred periods. Pure: follows
 /// that quantile of the measured lateness of wake-ups, in small steps, so that a thread spins no longer than its
 /// wake-ups need.
 class SpinMargin {

@@ -39,7 +39,7 @@ using runtime::MonotonicNs;
 
 constexpr std::int64_t kSessionUnknown = std::numeric_limits<std::int64_t>::max();
 constexpr auto kPollPeriod = std::chrono::milliseconds(10);
-/// During the session only refusals and another scene are looked for; orders, signals and End() end the wait.
+/// During the session refusals and other scenes are looked for; orders and End() end the wait, a signal mostly.
 constexpr auto kServePeriod = std::chrono::milliseconds(100);
 /// Phase of a node's steps relative to multiples k of the session's period dt, in periods. Physics begins just after k
 /// dt, when the ToolState of that time has arrived; thermal begins when the contact of that physics step has arrived.

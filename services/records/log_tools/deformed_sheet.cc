@@ -197,14 +197,16 @@ void DeformedSheet::FillDeadNodes() {
   }
 }
 
-std::optional<DeformedSheet::Place> DeformedSheet::Nearest(const Vec3f& p_W, float within_m) const {
+std::optional<DeformedSheet::Place> DeformedSheet::Nearest(const Vec3f& p_W, float within_m,
+                                                           std::span<const float> skin_m) const {
   std::optional<Place> nearest;
+  const auto gap = [&](const Place& place) { return place.distance_m - (skin_m.empty() ? 0.0f : skin_m[place.sheet]); };
   const std::vector<SheetPart> sheets = SheetsOf(scene_);
   for (std::size_t sheet = 0; sheet < sheets.size(); ++sheet) {
     std::optional<Place> place = NearestOn(sheets[sheet], p_W, within_m);
-    if (!place || (nearest && place->distance_m >= nearest->distance_m)) continue;
+    if (!place) continue;
     place->sheet = sheet;
-    nearest = place;
+    if (!nearest || gap(*place) < gap(*nearest)) nearest = place;
   }
   return nearest;
 }

@@ -33,8 +33,10 @@ class DeformedSheet {
     Vec2f material = Vec2f::Zero();  ///< (s, t) [m].
     std::size_t sheet = 0;           ///< Which of SheetsOf(scene).
   };
-  /// The nearest place; empty if the whole sheet is farther away than `within_m`.
-  [[nodiscard]] std::optional<Place> Nearest(const Vec3f& p_W, float within_m) const;
+  /// The nearest place; empty if all sheets are farther away than `within_m`. @param skin_m by sheet, or empty: what
+  /// surrounds its middle there. Of several sheets the one with the nearest skin is taken.
+  [[nodiscard]] std::optional<Place> Nearest(const Vec3f& p_W, float within_m,
+                                             std::span<const float> skin_m = {}) const;
 
  private:
   struct Point {

@@ -245,7 +245,7 @@ class Reader {
     bool follows = false;  // The previous sample along the metal touches too.
     bool strikes = false;
     for (const Vec3f& p_T : axis_) {
-      const auto place = sheet_.Nearest(pose.p_WT + pose.q_WT * p_T, limit_m_);
+      const auto place = sheet_.Nearest(pose.p_WT + pose.q_WT * p_T, limit_m_, touch_m_);
       const float gap_m = place ? place->distance_m - touch_m_[place->sheet] : std::numeric_limits<float>::infinity();
       if (!(gap_m <= reach_.holds_m)) {
         follows = false;

@@ -1,10 +1,12 @@
 #include "services/session/supervisor/session_generator.h"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "services/base/core/error.h"
 #include "services/base/runtime/cyclic_thread.h"
+#include "services/session/supervisor/watch_times.h"
 
 namespace fulcrum::supervisor {
 
@@ -25,7 +27,9 @@ CommandAnswer SessionGenerator::Turn(const std::string& words, std::int64_t now_
 }
 
 void SessionGenerator::Follow(const SessionClock& clock, std::int64_t now_ns) {
-  if (!clock.begun() || !panel_.Follow(clock.At(now_ns))) return;
+  // A turn ahead: readers apply a setting from its stamp on, which must not have passed when it arrives.
+  constexpr double kAhead_s = std::chrono::duration<double>(kSessionPeriod).count();
+  if (!clock.begun() || !panel_.Follow(clock.At(now_ns) + kAhead_s)) return;
   Publish(clock.start_ns() + static_cast<std::int64_t>(1e9 * panel_.turned_s()));
 }
 

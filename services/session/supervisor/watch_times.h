@@ -9,7 +9,8 @@
 namespace fulcrum::supervisor {
 
 inline constexpr auto kLoopPeriod = std::chrono::milliseconds(5);
-/// Of the supervisor while the session runs: deaths of nodes and commands interrupt it, and a Health may wait.
+/// Of the supervisor while the session runs. Deaths of children and commands interrupt it, a Health may wait, and what
+/// a script does to the generator is published ahead.
 inline constexpr auto kSessionPeriod = std::chrono::milliseconds(20);
 /// From a death to the sweep of shared memory [ns]. The sweep removes names only: a process that has files of the dead
 /// process open keeps them until their lease expires.

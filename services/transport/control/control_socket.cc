@@ -13,6 +13,7 @@
 #include <cstring>
 #include <stdexcept>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include "services/base/core/error.h"
@@ -197,7 +198,10 @@ void Server::AddDescriptors(std::vector<int>* descriptors) const {
 void AwaitInput(const std::vector<int>& descriptors, std::chrono::milliseconds longest) {
   std::vector<pollfd> inputs;
   for (const int descriptor : descriptors) inputs.push_back({descriptor, POLLIN, 0});
-  (void)::poll(inputs.data(), inputs.size(), static_cast<int>(longest.count()));
+  // Whoever connects without rights, or a descriptor that cannot be accepted, must not take the caller's whole time.
+  constexpr std::chrono::milliseconds kShortest(2);
+  if (::poll(inputs.data(), inputs.size(), static_cast<int>(longest.count())) > 0)
+    std::this_thread::sleep_for(kShortest);
 }
 
 Reply Ask(int connection, const Request& request, double limit_s) {

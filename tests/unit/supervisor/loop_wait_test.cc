@@ -1,4 +1,4 @@
-// What ends the pause between two turns of the supervisor: the test fails if each of these waited for the whole pause.
+// What ends the pause between two turns of the supervisor: the test fails if one of these does not end it.
 #include "services/session/supervisor/loop_wait.h"
 
 #include <gtest/gtest.h>

@@ -161,6 +161,11 @@ TEST_F(VerdictTest, FaultsOfPaceAreToldFromOthers) {
   End();
   EXPECT_EQ(verdict_.faults().size(), 2u) << Faults();
   EXPECT_EQ(testing::FaultsButPace(said()), "");
+  EXPECT_TRUE(testing::IsOfPace("fault at 6.8 s: render_node was stuck for more than 1.2 s"));
+  EXPECT_FALSE(testing::IsOfPace("fault at 6.8 s: physics_node was stuck for more than 1.2 s"));
+  EXPECT_FALSE(
+      testing::IsOfPace("fault at 9.0 s: haptics_node ran at 240.0 of 1000 Hz over 10 s; at least 75 % are needed"));
+  EXPECT_FALSE(testing::IsOfPace("fault at 9.0 s: physics_node missed 80 % of its periods; at most 15 % are allowed"));
   verdict_.Fail(5, ExitCode::kFailure, "the recorder lost samples");
   EXPECT_EQ(testing::FaultsButPace(said()), "fault at 5.0 s: the recorder lost samples\n");
 }

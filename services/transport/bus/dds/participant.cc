@@ -44,9 +44,10 @@ const Duration_t kSecuredAnnouncement{0, 100 * kMilli_ns};
 /// Delay after which a reader requests the samples for late joiners; the first heartbeat may have come before the
 /// match.
 const Duration_t kFirstAcknack{0, 10 * kMilli_ns};
-/// Period of the heartbeats of CauteryContact, whose history outlasts it. The library sends one with each sample of a
+/// Period of the heartbeats of CauteryContact, whose history outlasts it; shorter than kLinger, so that a lost last
+/// sample is repeated. The library sends one with each sample of a
 /// full history, and each reader answers each heartbeat.
-const Duration_t kStreamHeartbeat{0, 50 * kMilli_ns};
+const Duration_t kStreamHeartbeat{0, 30 * kMilli_ns};
 /// The period of a node is at least 10 ms wherever a reliable write can block.
 const Duration_t kMaxBlocking{0, 5 * kMilli_ns};
 /// Samples above this do not fit one UDP datagram and are sent in fragments.
