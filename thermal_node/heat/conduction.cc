@@ -65,7 +65,8 @@ template <bool kMain, bool kAnti, bool kFront>
     const float* __restrict f = &across_s[FaceS(0, j)];
     const float* __restrict smooth = kFront ? &tile->smooth_s[FaceS(0, j)] : nullptr;
     float* __restrict face = &face_s[FaceS(0, j)];
-    for (int i = 0; i <= kTile; ++i) face[i] = FourthOrder<kFront>(f[i - 1], f[i], f[i + 1], gain, kFront ? smooth + i : nullptr);
+    for (int i = 0; i <= kTile; ++i)
+      face[i] = FourthOrder<kFront>(f[i - 1], f[i], f[i + 1], gain, kFront ? smooth + i : nullptr);
   }
   const float* __restrict smooth_t = kFront ? &tile->smooth_t[FaceT(0, 0)] : nullptr;
   const float* __restrict f = &across_t[FaceT(0, 0)];
