@@ -19,9 +19,10 @@ constexpr std::size_t kVertices = 2 * kRows + 3;  // Of a section: both surfaces
 constexpr float kLeast_rad = 0.25f, kByDamage_rad = 1.3f, kVaried_rad = 1.0f;
 constexpr int kFramePasses = 12;         // A standard deviation of 1 mm along the lip.
 constexpr float kVariation_m = 0.0016f;  // Length over which it varies.
-constexpr float kFreeStep_m = 0.0001f;   // Of the search for the next cut.
+// Search for the next cut: from where no step of this contour's own texels is taken for one.
+constexpr float kFreeFrom_m = 0.0005f, kFreeStep_m = 0.0001f;
 // Texels that are removed have no colour of tissue: that of the wall is taken from this far beside them.
-constexpr float kInTissue_m = 0.00015f;
+constexpr float kInTissue_m = 0.00025f;
 
 float EaseBetween(float low, float high, float value) {
   const float u = std::clamp((value - low) / (high - low), 0.0f, 1.0f);
@@ -71,7 +72,7 @@ void CutLip::Find(const Atlas& atlas, const MembraneMesh& mesh, const SheetPlace
       if (!beside) continue;
       station.drawn = true;
       station.edge = places.Continued(mesh, *beside, point.material);
-      float free = 2 * kFreeStep_m;
+      float free = kFreeFrom_m;
       while (free < 2 * kWidth_m && !atlas.Removed(point.material + free * point.inward)) free += kFreeStep_m;
       station.width_m = std::min(kWidth_m, 0.5f * free);
       const Vec2f inner = point.material + station.width_m * point.inward;

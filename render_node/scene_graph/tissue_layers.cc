@@ -196,6 +196,7 @@ void TissueLayers::SetEyes(std::span<const Laparoscope> eyes) {
 }
 
 void TissueLayers::SetScale(float scale) {
+  if (scale == scale_) return;
   scale_ = scale;
   scope_changed_ = true;
 }

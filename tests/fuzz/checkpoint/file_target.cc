@@ -23,7 +23,7 @@ void Reseal(std::size_t slot, Bytes* file) {
   std::memcpy(&bytes, file->data() + at + 8, sizeof bytes);
   Hash64 hash;
   hash.AddValue(sequence);
-  hash.Add(std::as_bytes(std::span(*file)).subspan(at + kPage, std::min<std::uint64_t>(bytes, kPage)));
+  hash.AddLong(std::as_bytes(std::span(*file)).subspan(at + kPage, std::min<std::uint64_t>(bytes, kPage)));
   const std::uint64_t checksum = hash.value();
   std::memcpy(file->data() + at + 16, &checksum, sizeof checksum);
 }
