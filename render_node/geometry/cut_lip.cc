@@ -4,8 +4,6 @@
 #include <cmath>
 #include <cstdint>
 
-#include "services/base/core/sheets.h"
-
 namespace fulcrum::render {
 namespace {
 
@@ -48,16 +46,6 @@ float Variation(const Vec2f& material) {
 }
 
 }  // namespace
-
-std::vector<float> SheetThickness(const SceneView& scene) {
-  const std::vector<SheetPart> sheets = SheetsOf(scene);
-  std::vector<float> by_row;
-  for (const std::size_t sheet : SheetOfRows(scene)) {
-    const float own = sheets.empty() ? 0 : sheets[sheet].thickness_m;
-    by_row.push_back(own > 0 ? own : scene.thermal.thickness_m);
-  }
-  return by_row;
-}
 
 void CutLip::Find(const Atlas& atlas, const MembraneMesh& mesh, const SheetPlaces& places) {
   stations_.clear();

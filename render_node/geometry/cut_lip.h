@@ -20,6 +20,7 @@
 #include "render_node/geometry/cut_contour.h"
 #include "render_node/geometry/membrane_mesh.h"
 #include "render_node/geometry/sheet_place.h"
+#include "services/base/core/sheet_heat.h"
 
 namespace fulcrum::render {
 
@@ -53,13 +54,10 @@ struct CutGeometry {
   }
 };
 
-/// By row of the grid: thickness of its sheet [m].
-[[nodiscard]] std::vector<float> SheetThickness(const SceneView& scene);
-
 class CutLip {
  public:
   /// Keeps a reference to the arrays of `scene`.
-  explicit CutLip(const SceneView& scene) : cols_(scene.membrane.cols), thickness_(SheetThickness(scene)) {}
+  explicit CutLip(const SceneView& scene) : cols_(scene.membrane.cols), thickness_(ThicknessOfRows(scene)) {}
 
   /// Finds the lips anew, after a change of what is removed or of the topology. @pre places.SetTopology(mesh)
   void Find(const Atlas& atlas, const MembraneMesh& mesh, const SheetPlaces& places);

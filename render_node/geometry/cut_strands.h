@@ -31,7 +31,7 @@ class CutStrands {
   };
 
   /// Keeps a reference to the arrays of `scene`.
-  explicit CutStrands(const SceneView& scene) : scene_(scene), thickness_(SheetThickness(scene)) {}
+  explicit CutStrands(const SceneView& scene) : scene_(scene), thickness_(ThicknessOfRows(scene)) {}
 
   /// Finds the strands anew, after a change of what is removed or of the topology. @pre places.SetTopology(mesh)
   void Find(const Atlas& atlas, const MembraneMesh& mesh, const SheetPlaces& places);
