@@ -198,7 +198,8 @@ void Server::AddDescriptors(std::vector<int>* descriptors) const {
 void AwaitInput(const std::vector<int>& descriptors, std::chrono::milliseconds longest) {
   std::vector<pollfd> inputs;
   for (const int descriptor : descriptors) inputs.push_back({descriptor, POLLIN, 0});
-  // Whoever connects without rights, or a descriptor that cannot be accepted, must not take the caller's whole time.
+  // Connections of users without rights, or one that cannot be accepted, end each wait at once: the pause keeps the
+  // caller from using a whole core.
   constexpr std::chrono::milliseconds kShortest(2);
   if (::poll(inputs.data(), inputs.size(), static_cast<int>(longest.count())) > 0)
     std::this_thread::sleep_for(kShortest);

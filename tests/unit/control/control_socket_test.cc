@@ -77,7 +77,7 @@ TEST_F(ControlSocket, AServerMaySleepUntilARequestArrives) {
   };
   const auto begin = std::chrono::steady_clock::now();
   AwaitInput(descriptors(), 30ms);
-  EXPECT_GE(std::chrono::steady_clock::now() - begin, 30ms) << "nobody asks";
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, 30ms) << "no request has arrived";
   std::future<Reply> reply = std::async(std::launch::async, [&] { return Ask(socket_, {"down", ""}); });
   // First the connection, then the request over it.
   for (int turn = 0; turn < 20 && reply.wait_for(0s) != std::future_status::ready; ++turn) {
