@@ -235,10 +235,10 @@ TEST_F(TruthTest, MasksAreThoseOfFourTimesTheLines) {
   }
   rule.Expect("finer_same_samples");
   // The class at a pixel's centre and that of its larger part differ at the ends and bends of a border: of a strip ten
-  // pixels wide with strands of less than a pixel across it, as bared fat is, this is 2.5 %. No rule that looks at the
-  // centre can reach more.
-  limit.Expect("finer_limit_of_centres", 0.973);
-  masks.Expect("finer", std::min(0.98, limit.Of(TruthClass::kFat) - 0.002));
+  // pixels wide with strands across it, as bared fat is, this is 1.5 %. No rule that looks at the centre can reach
+  // more.
+  limit.Expect("finer_limit_of_centres", 0.98);
+  masks.Expect("finer", 0.98);
 }
 
 TEST_F(TruthTest, APixelIsWhereItsPointIs) {
