@@ -12,6 +12,8 @@ namespace fulcrum::render {
 namespace {
 
 constexpr std::uint8_t kDamaged = 20;  // Damage below this value (of 255) is not visible.
+// Up to these values of a texel (temperature, damage, dryness) membrane.frag draws intact tissue.
+constexpr std::uint8_t kWarm = 42, kFaint = 12, kDry = 2;
 // Half widths of a cut that is drawn from the topology: slit, charred, browned and blanched rim. Typical of an L-hook
 // at 30 W on peritoneum (0.2-0.5 mm lateral damage).
 constexpr float kSlit = 0.00030f;     // [m]
@@ -63,10 +65,11 @@ Atlas::Atlas(const SceneView& scene) : texel_m_(scene.membrane.texel_m) {
                0);
   blocks_x_ = (width_ + kBlock - 1) / kBlock;
   covered_.assign(static_cast<std::size_t>(blocks_x_) * ((height_ + kBlock - 1) / kBlock), 0);
-  touched_ = cut_ = covered_;
+  touched_ = cut_ = marked_ = covered_;
   painted_.assign(scene.membrane.triangle_count(), 0);
   const auto body = static_cast<std::uint8_t>(std::lround((scene.thermal.body_temperature_C - 20.0f) * 2));
   texels_.resize(4u * static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  if (body > kWarm) std::ranges::fill(marked_, std::uint8_t{1});
   for (std::size_t i = 0; i < texels_.size(); i += 4) {
     texels_[i] = body;
     texels_[i + 1] = 0;
@@ -116,6 +119,9 @@ bool Atlas::SetLiquid(int x, int y, std::uint8_t blood, std::uint8_t clot, std::
   cell[0] = blood;
   cell[2] = clot;
   cell[3] = water;
+  if (blood != 0 || clot != 0 || water != 0) {
+    Mark(TexelIndex(x * kFilmCell / kBlock, y * kFilmCell / kBlock, blocks_x_));
+  }
   film_change_ = film_change_.United({x, y, 1, 1});
   return true;
 }
@@ -210,12 +216,32 @@ void Atlas::Touch(const AtlasRect& rect) {
       const std::size_t block = TexelIndex(x / kBlock, y / kBlock, blocks_x_);
       std::uint8_t& touched = touched_[block];
       if (texel[3] < 128) cut_[block] = 1;
+      if (texel[0] > kWarm || texel[1] > kFaint || texel[2] > kDry || texel[3] < 128) Mark(block);
       if (touched == 0 && (texel[1] >= kDamaged || texel[3] < 128)) {
         touched = 1;
         ++touches_;
       }
     }
   }
+}
+
+void Atlas::Mark(std::size_t block) {
+  if (marked_[block] == 0) ++marks_;
+  marked_[block] = 1;
+}
+
+bool Atlas::Untouched(const Vec2f& low, const Vec2f& high) const {
+  const auto block_of = [this](float place, int texels) {
+    return std::clamp(static_cast<int>(std::floor(place / texel_m_)), 0, texels - 1) / kBlock;
+  };
+  const int x0 = block_of(low.x() - kReach_m, width_), x1 = block_of(high.x() + kReach_m, width_);
+  const int y0 = block_of(low.y() - kReach_m, height_), y1 = block_of(high.y() + kReach_m, height_);
+  for (int y = y0; y <= y1; ++y) {
+    for (int x = x0; x <= x1; ++x) {
+      if (marked_[TexelIndex(x, y, blocks_x_)] != 0) return false;
+    }
+  }
+  return true;
 }
 
 bool Atlas::Touched(const Vec2f& material) const {

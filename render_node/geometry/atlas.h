@@ -88,6 +88,13 @@ class Atlas {
   /// Number of blocks for which Touched() has become true.
   [[nodiscard]] std::uint64_t touches() const { return touches_; }
 
+  /// False if anything within kReach_m of the rectangle from `low` to `high` [m] has looked otherwise than intact, dry
+  /// tissue below 41 degrees: hot, damaged, dried, removed, or under blood, clot or water. It stays false.
+  [[nodiscard]] bool Untouched(const Vec2f& low, const Vec2f& high) const;
+  /// The same number, the same answers of Untouched().
+  [[nodiscard]] std::uint64_t marks() const { return marks_; }
+  static constexpr float kReach_m = 0.0026f;
+
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] float texel_m() const { return texel_m_; }
@@ -100,6 +107,7 @@ class Atlas {
   void MarkRim(int x, int y);
   void MarkRimsAgain(const AtlasRect& rect);
   void Touch(const AtlasRect& rect);
+  void Mark(std::size_t block);
   AtlasRect PaintCapsule(const Vec2f& a, const Vec2f& b);
 
   float texel_m_;
@@ -114,7 +122,8 @@ class Atlas {
   std::vector<std::uint8_t> covered_;  // Per block of kBlock x kBlock texels.
   std::vector<std::uint8_t> touched_;  // Per block.
   std::vector<std::uint8_t> cut_;      // Per block: texels have been removed.
-  std::uint64_t touches_ = 0;
+  std::vector<std::uint8_t> marked_;   // Per block: not Untouched().
+  std::uint64_t touches_ = 0, marks_ = 0;
   std::uint64_t removals_ = 0, patches_ = 0;
   std::vector<std::uint8_t> painted_;  // Per membrane triangle: bits of the dead edges that are already drawn.
 };

@@ -29,7 +29,7 @@ FieldOfView::FieldOfView(std::span<const Laparoscope> eyes) : stereo_(eyes.size(
 }
 
 bool FieldOfView::Find(std::span<const Vec3f> positions, std::span<const Triangle> triangles, Sides sides,
-                       std::vector<Triangle>* seen) {
+                       std::vector<Triangle>* seen, std::span<std::size_t> ends) {
   beyond_.resize(positions.size());
   for (std::size_t i = 0; i < positions.size(); ++i) {
     Eigen::Vector4f distance = planes_.leftCols<3>() * positions[i] + planes_.col(3);
@@ -40,7 +40,13 @@ bool FieldOfView::Find(std::span<const Vec3f> positions, std::span<const Triangl
   }
   found_.clear();
   found_.reserve(triangles.size());
-  for (const Triangle& t : triangles) {
+  std::size_t run = 0;
+  const auto end_runs = [&](std::size_t at) {
+    for (; run < ends.size() && ends[run] <= at; ++run) ends[run] = found_.size();
+  };
+  for (std::size_t k = 0; k < triangles.size(); ++k) {
+    end_runs(k);
+    const Triangle& t = triangles[k];
     if ((beyond_[t[0]] & beyond_[t[1]] & beyond_[t[2]]) != 0) {
       continue;
     }
@@ -53,6 +59,7 @@ bool FieldOfView::Find(std::span<const Vec3f> positions, std::span<const Triangl
     }
     found_.push_back(t);
   }
+  end_runs(triangles.size());
   if (found_ == *seen) {
     return false;
   }

@@ -2,6 +2,7 @@
 // costs more than this test. Pure.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -20,8 +21,10 @@ class FieldOfView {
   /// Writes to `seen`, in their order, the triangles that are not completely beyond one edge of the square around the
   /// optics' circle and, with Sides::kFront, are not back-facing; with two eyes those that are so for one of them.
   /// Returns true if `seen` has changed. Positions in frame W [m].
+  ///
+  /// @param ends  Ascending numbers of triangles at which runs end; each is replaced by the place in `seen`.
   bool Find(std::span<const Vec3f> positions, std::span<const Triangle> triangles, Sides sides,
-            std::vector<Triangle>* seen);
+            std::vector<Triangle>* seen, std::span<std::size_t> ends = {});
 
  private:
   Eigen::Matrix4f planes_;  // Row k: positive beyond edge k, for an eye in the middle of the two.

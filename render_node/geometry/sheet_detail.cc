@@ -130,28 +130,43 @@ void SheetDetail::AppendBlock(const MembraneMesh& membrane, std::uint32_t row, s
 }
 
 void SheetDetail::Choose(const MembraneMesh& membrane, const Vec3f& eye_W, float pixels_per_rad,
-                         std::vector<Triangle>* out) {
-  out->clear();
+                         std::span<const std::uint8_t> untouched, SheetRuns* out) {
+  out->triangles.clear();
+  out->ends.clear();
   if (grid_.node_count() == 0) {
     return;
   }
   ChooseLevels(membrane, eye_W, pixels_per_rad);
   const std::span<const Vec3f> x = membrane.positions();
   const bool last_is_far = (x[0] - eye_W).norm() < (x[grid_.node_count() - 1] - eye_W).norm();
+  const auto is_untouched = [&](std::size_t block) { return membrane.block_intact(block) && untouched[block] != 0; };
+  bool now = true;  // Run 0 is of untouched blocks.
+  const auto end_run = [&] {
+    out->ends.push_back(out->triangles.size());
+    now = !now;
+  };
   for (std::uint32_t k = 0; k < membrane.block_rows(); ++k) {
     const std::uint32_t row = last_is_far ? membrane.block_rows() - 1 - k : k;
-    for (std::uint32_t col = 0; col < membrane.block_cols(); ++col) {
-      const std::size_t index = std::size_t{row} * membrane.block_cols() + col;
-      if (membrane.block_intact(index)) {
-        AppendBlock(membrane, row, col, out);
-      } else {
-        const auto triangles = membrane.block_triangles(index);
-        out->insert(out->end(), triangles.begin(), triangles.end());
+    const std::size_t first = std::size_t{row} * membrane.block_cols();
+    // Within a row the present run goes on first.
+    for (const bool wanted : {now, !now}) {
+      for (std::uint32_t col = 0; col < membrane.block_cols(); ++col) {
+        const std::size_t index = first + col;
+        if (is_untouched(index) != wanted) continue;
+        if (now != wanted) end_run();
+        if (membrane.block_intact(index)) {
+          AppendBlock(membrane, row, col, &out->triangles);
+        } else {
+          const auto triangles = membrane.block_triangles(index);
+          out->triangles.insert(out->triangles.end(), triangles.begin(), triangles.end());
+        }
       }
     }
   }
   const auto parts = membrane.triangles().subspan(membrane.whole_triangles());
-  out->insert(out->end(), parts.begin(), parts.end());
+  if (now && !parts.empty()) end_run();
+  out->triangles.insert(out->triangles.end(), parts.begin(), parts.end());
+  end_run();
 }
 
 }  // namespace fulcrum::render

@@ -46,6 +46,12 @@ class Collector final : public osg::NodeVisitor {
     if (std::find(names_.begin(), names_.end(), geometry.getName()) == names_.end()) return;
     // The fixed surroundings are there for two backgrounds; the jaws of an instrument share a mesh.
     if (tool_ < 0 && !seen_.insert(&geometry).second) return;
+    // The sheet is one surface in several runs of triangles.
+    if (tool_ < 0 && !surfaces.empty() && geometry.getVertexArray() == last_) {
+      AppendTriangles(geometry, &surfaces.back());
+      return;
+    }
+    last_ = geometry.getVertexArray();
     DrawnSurface surface;
     surface.name = geometry.getName();
     surface.tool = tool_;
@@ -57,6 +63,12 @@ class Collector final : public osg::NodeVisitor {
   std::vector<DrawnSurface> surfaces;
 
  private:
+  static void AppendTriangles(const osg::Geometry& geometry, DrawnSurface* surface) {
+    const auto& corners = dynamic_cast<const osg::DrawElementsUInt&>(*geometry.getPrimitiveSet(0));
+    for (std::size_t k = 0; k + 2 < corners.size(); k += 3) {
+      surface->triangles.push_back({corners[k], corners[k + 1], corners[k + 2]});
+    }
+  }
   void Read(const osg::Geometry& geometry, DrawnSurface* surface) const {
     const osg::StateSet* state = geometry.getStateSet();
     osg::Vec3 shift;
@@ -73,11 +85,7 @@ class Collector final : public osg::NodeVisitor {
       const osg::Vec3d p_W = osg::Vec3d(p + shift) * place_;
       surface->positions_W.emplace_back(p_W.x(), p_W.y(), p_W.z());
     }
-    const auto& corners = dynamic_cast<const osg::DrawElementsUInt&>(*geometry.getPrimitiveSet(0));
-    surface->triangles.resize(corners.size() / 3);
-    for (std::size_t t = 0; t < surface->triangles.size(); ++t) {
-      for (std::size_t k = 0; k < 3; ++k) surface->triangles[t][k] = corners[3 * t + k];
-    }
+    AppendTriangles(geometry, surface);
     if (const auto* coordinates = dynamic_cast<const osg::Vec4Array*>(geometry.getTexCoordArray(0))) {
       for (const osg::Vec4& c : *coordinates) surface->coordinates.push_back({c[0], c[1], c[2], c[3]});
     }
@@ -85,6 +93,7 @@ class Collector final : public osg::NodeVisitor {
 
   std::span<const std::string_view> names_;
   std::set<const osg::Geometry*> seen_;
+  const osg::Array* last_ = nullptr;  // Positions of the last surface.
   osg::Matrix place_;
   int tool_ = -1;
   std::map<std::pair<std::string, int>, int> parts_;

@@ -81,7 +81,8 @@ class LaparoscopeView {
   /// The next picture draws a background for the smoothing though the camera rests, which ends after a period.
   [[nodiscard]] bool DrawsBackgroundAtRest() const;
 
-  /// Updates the meshes after SetTissue and SetTopology; separate, so that several changes need one update only.
+  /// Updates the meshes after SetTissue, SetTopology, ApplyPatch and UpdateEffects; separate, so that several changes
+  /// need one update only.
   /// Without a change the next picture reuses the last one of the scene.
   void Update();
 

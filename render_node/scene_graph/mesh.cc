@@ -43,6 +43,15 @@ Mesh::Mesh(std::string_view name, bool dynamic)
   geometry_->addPrimitiveSet(triangles_);
 }
 
+Mesh::Mesh(std::string_view name, const Mesh& mesh) : Mesh(name, true) {
+  positions_ = mesh.positions_;
+  normals_ = mesh.normals_;
+  coordinates_ = mesh.coordinates_;
+  geometry_->setVertexArray(positions_);
+  geometry_->setNormalArray(normals_, osg::Array::BIND_PER_VERTEX);
+  geometry_->setTexCoordArray(0, coordinates_, osg::Array::BIND_PER_VERTEX);
+}
+
 void Mesh::SetPositions(std::span<const Vec3f> positions) { Fill(positions, positions_.get()); }
 
 void Mesh::SetNormals(std::span<const Vec3f> normals) {

@@ -13,6 +13,8 @@ class Mesh {
  public:
   /// @param name name for messages. @param dynamic positions change from picture to picture.
   Mesh(std::string_view name, bool dynamic);
+  /// Other triangles of `mesh`: positions, normals and coordinates are those of `mesh`, which sets them.
+  Mesh(std::string_view name, const Mesh& mesh);
 
   void SetPositions(std::span<const Vec3f> positions);
   void SetNormals(std::span<const Vec3f> normals);

@@ -258,12 +258,16 @@ void Optics::AddField(Eye* eye) {
   if (layout_ != StereoLayout::kNone) state->setMode(GL_CLIP_PLANE0, osg::StateAttribute::ON);
   state->setMode(GL_DEPTH_TEST, osg::StateAttribute::OFF);
   field.state()->setRenderBinDetails(0, "RenderBin");
-  std::vector<Vec3f> positions{Vec3f::Zero()};
-  std::vector<Triangle> triangles;
+  std::vector<Vec3f> positions;
   for (Index k = 0; k < kSides; ++k) {
     const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(k) / kSides;
     positions.emplace_back(std::cos(angle), std::sin(angle), 0.0f);
-    triangles.push_back({0, 1 + k, 1 + (k + 1) % kSides});
+  }
+  // A square, then a triangle over each side, over its two sides, …: a fan's long edges cross four times as many blocks
+  // of pixels, each of which is shaded for both sides.
+  std::vector<Triangle> triangles{{0, kSides / 4, kSides / 2}, {0, kSides / 2, 3 * kSides / 4}};
+  for (Index step = kSides / 4; step > 1; step /= 2) {
+    for (Index k = 0; k < kSides; k += step) triangles.push_back({k, k + step / 2, (k + step) % kSides});
   }
   field.SetPositions(positions);
   field.SetTriangles(triangles);

@@ -144,19 +144,27 @@ void TissueLayers::AddSheets() {
     Blend(layer->mesh->state());
     layer->mesh->state()->addUniform(new osg::Uniform("behind", kFatBehind));
   }
-  Add(&sheet_, "membrane", Order::kMembrane,
-      MakeProgram("surface.vert", "membrane.frag", DrawsCuts(scene_) ? "" : "AS_PRINTED"));
-  Blend(sheet_.mesh->state());
-  sheet_.mesh->state()->addUniform(new osg::Uniform("fascia_depth", kFasciaDepth));
+  touched_state_ = new osg::StateSet;
+  // Runs are drawn in their order, whatever their shaders.
+  touched_state_->setRenderBinDetails(static_cast<int>(Order::kMembrane), "TraversalOrderBin");
+  Blend(touched_state_);
+  touched_state_->addUniform(new osg::Uniform("fascia_depth", kFasciaDepth));
   const auto around = SurroundingColour(SurfaceRole::kRetroperitoneum);
-  sheet_.mesh->state()->addUniform(new osg::Uniform("around", osg::Vec4(around[0], around[1], around[2], around[3])));
+  touched_state_->addUniform(new osg::Uniform("around", osg::Vec4(around[0], around[1], around[2], around[3])));
+  untouched_state_ = new osg::StateSet(*touched_state_);
+  untouched_state_->setAttributeAndModes(MakeProgram("surface.vert", "membrane.frag", "UNTOUCHED"));
+  touched_state_->setAttributeAndModes(
+      MakeProgram("surface.vert", "membrane.frag", DrawsCuts(scene_) ? "" : "AS_PRINTED"));
   AddPlannedLine();
+  sheet_.push_back(std::make_unique<Mesh>("membrane", true));
+  sheet_.front()->geometry()->setStateSet(untouched_state_);
+  geode_->addDrawable(sheet_.front()->geometry());
 }
 
 void TissueLayers::AddPlannedLine() {
   const std::size_t all = scene_.planned_line.size();
   const std::size_t count = std::min(all, kMostLinePoints);
-  osg::StateSet* state = sheet_.mesh->state();
+  osg::StateSet* state = touched_state_;
   state->addUniform(new osg::Uniform("planned_points", static_cast<int>(count)));
   if (count < 2) {
     return;
@@ -222,6 +230,11 @@ void TissueLayers::RehearseBurn(bool on) {
   rehearsing_ = on;
   fat_chosen_ = false;
   UpdateFat();
+  // Each other block of the membrane as touched: both its shaders are drawn.
+  const std::vector<std::uint8_t> untouched = untouched_;
+  for (std::size_t block = 1; on && block < untouched_.size(); block += 2) untouched_[block] = 0;
+  ShowMembrane();
+  untouched_ = untouched;
   if (!on) {
     burn_.EndRehearsal(geode_);
     cut_.EndRehearsal(geode_);
@@ -239,12 +252,14 @@ void TissueLayers::RehearseBurn(bool on) {
 
 bool TissueLayers::Update(const Atlas& atlas) {
   const bool moved = tissue_changed_ || topology_changed_ || scope_changed_ || burn_.grown();
+  const bool marked = FindUntouched(atlas);
   if (moved) UpdateMembrane();
+  if (moved || marked) ShowMembrane();
   // A patch alone changes lips at most.
   const bool cut_changed = DrawsCuts(scene_) && cut_.Update(atlas, membrane_, recut_, moved, eye_W_,
                                                             std::min(scale_, 1.0f) * pixels_per_rad_, &field_, geode_);
   recut_ = false;
-  if (!moved) return cut_changed;
+  if (!moved) return cut_changed || marked;
   UpdateFat();
   if (tissue_changed_ || scope_changed_) {
     if (tissue_changed_) UpdateSolids();
@@ -267,22 +282,56 @@ void TissueLayers::UpdateSolids() {
   ComputeNormals(solid_positions_, scene_.surface_triangles, solid_normals_);
 }
 
+bool TissueLayers::FindUntouched(const Atlas& atlas) {
+  if (marks_ == atlas.marks()) return false;
+  marks_ = atlas.marks();
+  const std::uint32_t rows = membrane_.block_rows(), cols = membrane_.block_cols();
+  untouched_.assign(std::size_t{rows} * cols, 0);
+  // The paper's colours are functions of the present temperature: nothing is left out.
+  if (scene_.thermal.model == ThermalModel::kPaper) return true;
+  Eigen::AlignedBox2f planned;
+  for (const Vec2f& p : scene_.planned_line) planned.extend(p);
+  for (std::size_t block = 0; block < untouched_.size(); ++block) {
+    Eigen::AlignedBox2f box;
+    detail_.ForEachNode(block, [&](Index node) { box.extend(scene_.membrane_material[node]); });
+    const bool inked = !planned.isEmpty() && planned.exteriorDistance(box) <= kInkReach;
+    untouched_[block] = !inked && atlas.Untouched(box.min(), box.max()) ? 1 : 0;
+  }
+  return true;
+}
+
 void TissueLayers::UpdateMembrane() {
   const bool moved = tissue_changed_ || topology_changed_;
   if (moved) membrane_.Update(xyz_);
   const std::span<const Vec3f> positions = membrane_.positions();
-  if (moved) sheet_.mesh->SetPositions(positions);
-  if (moved) sheet_.mesh->SetNormals(membrane_.normals());
+  if (moved) sheet_.front()->SetPositions(positions);
+  if (moved) sheet_.front()->SetNormals(membrane_.normals());
   if (topology_changed_) {
     std::vector<Float4> coordinates(positions.size());
     for (std::size_t k = 0; k < coordinates.size(); ++k) {
       const Vec2f& m = membrane_.materials()[k];
       coordinates[k] = {m.x(), m.y(), membrane_.sides()[k], rim_[membrane_.NodeOf(static_cast<Index>(k))]};
     }
-    sheet_.mesh->SetCoordinates(coordinates);
+    sheet_.front()->SetCoordinates(coordinates);
   }
-  detail_.Choose(membrane_, eye_W_, detail_factor_ * pixels_per_rad_, &chosen_);
-  Show(&sheet_, positions, chosen_, Sides::kBoth);
+}
+
+void TissueLayers::ShowMembrane() {
+  detail_.Choose(membrane_, eye_W_, detail_factor_ * pixels_per_rad_, untouched_, &chosen_);
+  std::vector<std::size_t>& ends = chosen_.ends;
+  const bool changed = field_.Find(membrane_.positions(), chosen_.triangles, Sides::kBoth, &shown_.triangles, ends);
+  if (!changed && ends == shown_.ends) return;
+  shown_.ends = ends;
+  while (sheet_.size() < ends.size()) {
+    const bool untouched = sheet_.size() % 2 == 0;
+    sheet_.push_back(std::make_unique<Mesh>("membrane", *sheet_.front()));
+    sheet_.back()->geometry()->setStateSet(untouched ? untouched_state_ : touched_state_);
+    geode_->addDrawable(sheet_.back()->geometry());
+  }
+  for (std::size_t k = 0; k < sheet_.size(); ++k) {
+    const std::size_t first = k == 0 ? 0 : k < ends.size() ? ends[k - 1] : 0, end = k < ends.size() ? ends[k] : first;
+    sheet_[k]->SetTriangles(std::span(shown_.triangles).subspan(first, end - first));
+  }
 }
 
 void TissueLayers::UpdateFat() {

@@ -75,6 +75,9 @@ class TissueLayers {
   void AddPlannedLine();
   void UpdateSolids();
   void UpdateMembrane();
+  /// Returns true if the atlas may have marked others than at the last call.
+  bool FindUntouched(const Atlas& atlas);
+  void ShowMembrane();
   void UpdateFat();
   void ChooseFat();
 
@@ -93,7 +96,12 @@ class TissueLayers {
   std::vector<std::array<float, 4>> fat_coordinates_;
   std::vector<float> fat_bared_;  ///< As drawn.
   bool fat_chosen_ = false, rehearsing_ = false;
-  std::vector<Triangle> chosen_;  // Scratch: triangles of the membrane at the level of detail that is needed.
+  SheetRuns chosen_, shown_;             // The membrane's triangles at the level of detail needed; those that are seen.
+  std::vector<std::uint8_t> untouched_;  // Per block of the membrane's mesh.
+  std::uint64_t marks_ = ~std::uint64_t{0};  // Atlas::marks() of untouched_.
+  // The membrane: meshes over the arrays of the first one, a run of triangles each.
+  std::vector<std::unique_ptr<Mesh>> sheet_;
+  osg::ref_ptr<osg::StateSet> touched_state_, untouched_state_;
   const std::vector<float> rim_;  // Per node of the membrane's grid (geometry/sheet_rim.h).
   float scale_ = 1;
   bool tissue_changed_ = true, topology_changed_ = true, scope_changed_ = true;
@@ -103,7 +111,7 @@ class TissueLayers {
   std::vector<SolidLayer> solids_;
   BurnLayer burn_;
   CutLayer cut_;
-  Layer fat_layer_, beneath_layer_, sheet_;
+  Layer fat_layer_, beneath_layer_;
 };
 
 }  // namespace fulcrum::render

@@ -10,7 +10,9 @@ in vec4 coordinate;
 uniform sampler2D atlas;
 uniform sampler2D serosa_pattern;
 uniform vec2 atlas_per_metre;
+#ifndef UNTOUCHED // Tissue without history (Atlas::Untouched), most of a sheet, in half the time.
 uniform float colour_by_temperature; // 1: the paper's eq. 15, a function of the present temperature.
+#endif
 #ifdef AS_PRINTED // The paper's eq. 15 to the letter (geometry/paper_colour.h). Apart: a software rasteriser compiles slowly.
 uniform vec4 printed_limits;     // T_a and T_vaporization [degree C], v_vaporization, v_brown.
 uniform vec4 printed_colours[3]; // C1, C2, C3.
@@ -53,14 +55,18 @@ vec2 ToFascia(vec2 m, vec3 n) {
 
 void main() {
   vec2 m = coordinate.xy;
-  vec4 heat = texture(atlas, m * atlas_per_metre);
   vec2 m_fascia = m + ToFascia(m, normalize(normal));
+  vec4 noise = texture(serosa_pattern, m * 16.0);
+#ifdef UNTOUCHED // What follows from these constants is left out by the compiler.
+  const vec4 heat = vec4(0.0, 0.0, 0.0, 1.0), heat_below = heat, wet_film = vec4(0.0);
+  const float edge = 0.0, ink = 0.0, colour_by_temperature = 0.0;
+#else
+  vec4 heat = texture(atlas, m * atlas_per_metre);
   vec4 heat_below = texture(atlas, m_fascia * atlas_per_metre);
 #ifdef AS_PRINTED
   heat.a = heat_below.a = 1.0; // The paper cuts no holes in the texture.
 #endif
   if (coordinate.z < 0.0 || max(heat.a, heat_below.a) < 0.5) discard;
-  vec4 noise = texture(serosa_pattern, m * 16.0);
   vec4 wet_film = texture(film_map, m * film_per_metre);
 #ifdef AS_PRINTED
   float edge = 0.0; // No holes, no rims.
@@ -68,13 +74,14 @@ void main() {
   float edge = wet_film.g;
   if (edge > kLipNearness) discard; // There the lips of the cut are drawn (cut.frag).
 #endif
+  float ink = PlannedInk(m);
+#endif
   float vessel = noise.a;
   float celsius = 20.0 + 127.5 * heat.r;
   float damage = heat.g;
   float dry = clamp(2.0 * heat.b, 0.0, 1.0);
   float burnt = clamp(2.0 * heat.b - 1.0, 0.0, 1.0);
 
-  float ink = PlannedInk(m);
   vec3 bend = noise.rgb - 0.5;
   vec3 n = normalize(normal + 0.12 * bend);
   vec3 film = normalize(normal + 0.40 * bend + 0.80 * (texture(serosa_pattern, m * 115.0).rgb - 0.5));
@@ -118,13 +125,17 @@ void main() {
   float clot = bloody * ClotShare(wet_film);
   albedo = mix(ThroughBlood(albedo, blood), kClot * (0.5 + noise.b), 0.85 * clot);
   alpha = mix(alpha, 0.97, bloody);
+#ifndef UNTOUCHED
   film = normalize(mix(film, normal + (0.5 + 0.6 * clot) * bend, bloody));
+#endif
 
   float wet = mix(1.6 * (1.0 - 0.92 * max(brown, 0.3 * pale)), 1.8 - 1.0 * clot, bloody);
   // Water darkens a little, and is smoother than the tissue's own film.
   float rinsed = smoothstep(0.0, 0.25, wet_film.a);
   albedo *= 1.0 - 0.12 * rinsed;
+#ifndef UNTOUCHED
   film = normalize(mix(film, normal + 0.35 * bend, rinsed));
+#endif
   wet += 0.7 * rinsed;
 
   // The fascia's fibres run obliquely across the organ with varying density; burns of the peritoneum apply to them as

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 
 #include "services/scene/builder/build.h"
 #include "tests/support/whole_topology.h"
@@ -128,6 +129,48 @@ TEST_F(AtlasTest, BloodIsIndependentOfPatches) {
   atlas_.Apply(PatchAt(32, 64, 99));
   EXPECT_EQ(atlas_.Blood(place), 1);
   EXPECT_EQ(atlas_.Blood(Vec2f(-1, -1)), 0) << "beside the sheet";
+}
+
+TEST_F(AtlasTest, WhatShowsAHistoryIsNoLongerUntouchedAndTheRestIs) {
+  const float m = atlas_.texel_m();
+  const Vec2f middle(0.5f * static_cast<float>(atlas_.width()) * m, 0.5f * static_cast<float>(atlas_.height()) * m);
+  const Vec2f corner(0.001f, 0.001f), all = 2 * middle;
+  const auto x = static_cast<std::uint32_t>(middle.x() / m), y = static_cast<std::uint32_t>(middle.y() / m);
+  ASSERT_TRUE(atlas_.Untouched(Vec2f::Zero(), all));
+  // Temperature, damage, dryness and opening of a texel; the first three as the shader draws them intact.
+  const std::array<std::array<std::uint8_t, 4>, 2> intact{{{34, 0, 0, 255}, {41, 12, 2, 255}}};
+  const std::array<std::array<std::uint8_t, 4>, 4> other{
+      {{46, 0, 0, 255}, {34, 20, 0, 255}, {34, 0, 8, 255}, {34, 0, 0, 0}}};
+  TemperaturePatch patch = PatchAt(x, y, 0);
+  const auto apply = [&](Atlas* atlas, const std::array<std::uint8_t, 4>& texel) {
+    for (std::size_t k = 0; k < patch.texels.size(); k += 4) std::ranges::copy(intact[0], &patch.texels[k]);
+    std::ranges::copy(texel, patch.texels.data());
+    ASSERT_FALSE(atlas->Apply(patch).empty());
+  };
+  for (const auto& texel : intact) {
+    apply(&atlas_, texel);
+    EXPECT_TRUE(atlas_.Untouched(Vec2f::Zero(), all)) << int{texel[0]};
+  }
+  for (const auto& texel : other) {
+    Atlas atlas(view_);
+    apply(&atlas, texel);
+    EXPECT_FALSE(atlas.Untouched(middle, middle));
+    EXPECT_FALSE(atlas.Untouched(middle + Vec2f(0.0025f, 0), middle + Vec2f(0.004f, 0)))
+        << "the fascia is seen beside it";
+    EXPECT_TRUE(atlas.Untouched(corner, corner));
+    EXPECT_EQ(atlas.marks(), 1u);
+    apply(&atlas, intact[0]);
+    EXPECT_FALSE(atlas.Untouched(middle, middle)) << "it has a history";
+  }
+  Atlas wet(view_);
+  wet.SetLiquid(static_cast<int>(x) / 2, static_cast<int>(y) / 2, 0, 0, 0);
+  EXPECT_TRUE(wet.Untouched(Vec2f::Zero(), all));
+  wet.SetLiquid(static_cast<int>(x) / 2, static_cast<int>(y) / 2, 0, 0, 9);
+  EXPECT_FALSE(wet.Untouched(middle, middle));
+  EXPECT_TRUE(wet.Untouched(corner, corner));
+  SceneView hot = view_;
+  hot.thermal.body_temperature_C = 42;
+  EXPECT_FALSE(Atlas(hot).Untouched(corner, corner));
 }
 
 TEST_F(AtlasTest, WhatAPatchSaidIsNotPaintedOver) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <vector>
 
 #include "render_node/geometry/field_of_view.h"
 #include "render_node/geometry/quality.h"
@@ -24,9 +25,25 @@ class DetailTest : public testing::Test {
   }
 
   std::vector<Triangle> Choose(const MembraneMesh& mesh, float pixels_per_rad = 500) {
-    std::vector<Triangle> chosen;
-    SheetDetail(view_.membrane).Choose(mesh, view_.render.scope_tip_W, pixels_per_rad, &chosen);
-    return chosen;
+    return Runs(
+               mesh, [](std::size_t) { return false; }, pixels_per_rad)
+        .triangles;
+  }
+
+  template <class Untouched>
+  SheetRuns Runs(const MembraneMesh& mesh, const Untouched& untouched, float pixels_per_rad = 500) {
+    std::vector<std::uint8_t> blocks(std::size_t{mesh.block_rows()} * mesh.block_cols());
+    for (std::size_t k = 0; k < blocks.size(); ++k) blocks[k] = untouched(k) ? 1 : 0;
+    SheetRuns runs;
+    SheetDetail(view_.membrane).Choose(mesh, view_.render.scope_tip_W, pixels_per_rad, blocks, &runs);
+    return runs;
+  }
+
+  /// The block of the grid that contains a triangle.
+  static std::size_t BlockOf(const MembraneMesh& mesh, const Triangle& t, Index cols) {
+    Index row = t[0] / cols, col = t[0] % cols;
+    for (const Index node : t) row = std::min(row, node / cols), col = std::min(col, node % cols);
+    return std::size_t{row / MembraneMesh::kBlockRows} * mesh.block_cols() + col / MembraneMesh::kBlockCols;
   }
 
   const scene::SceneData data_;
@@ -157,6 +174,65 @@ TEST_F(DetailTest, ACutIsDrawnAsFinelyAsItIs) {
   }
   for (const Triangle& t : mesh.triangles().subspan(mesh.whole_triangles())) {
     EXPECT_NE(std::find(chosen.begin(), chosen.end(), t), chosen.end()) << "a part of a cut triangle";
+  }
+}
+
+TEST_F(DetailTest, UntouchedBlocksHaveRunsOfTheirOwnAndRowsStayInTheirOrder) {
+  TopologyState topology = WholeTopology(view_);
+  const Index node = view_.membrane.rows / 2 * view_.membrane.cols + view_.membrane.cols / 2;
+  SetBit(topology.dead_edges, 3 * std::size_t{node});
+  SetBit(topology.dead_edges, 3 * std::size_t{node} + 2);
+  MembraneMesh mesh(view_);
+  ASSERT_TRUE(mesh.SetTopology(topology));
+  mesh.Update(xyz_);
+  std::vector<Triangle> all = Choose(mesh);
+  std::ranges::sort(all);
+  const auto untouched = [](std::size_t block) { return block % 3 != 0; };
+  const SheetRuns runs = Runs(mesh, untouched);
+  std::vector<Triangle> drawn = runs.triangles;
+  std::ranges::sort(drawn);
+  EXPECT_EQ(drawn, all) << "the same triangles";
+  ASSERT_EQ(runs.ends.back(), runs.triangles.size());
+  EXPECT_GT(runs.ends.size(), 2u);
+  EXPECT_LE(runs.ends.size(), mesh.block_rows() + 2u) << "a change of shader within each row, not at each block";
+  const std::size_t parts = mesh.triangles().size() - mesh.whole_triangles();
+  const std::size_t whole = runs.triangles.size() - parts;
+  ASSERT_GT(parts, 0u);
+  std::size_t run = 0, last_row = 0;
+  bool down = false, up = false;
+  for (std::size_t k = 0; k < runs.triangles.size(); ++k) {
+    while (k >= runs.ends[run]) ++run;
+    if (k >= whole) {
+      EXPECT_EQ(run % 2, 1u) << "a part of a cut triangle";
+      continue;
+    }
+    const std::size_t block = BlockOf(mesh, runs.triangles[k], view_.membrane.cols);
+    EXPECT_EQ(run % 2 == 0, untouched(block) && mesh.block_intact(block)) << block;
+    const std::size_t row = block / mesh.block_cols();
+    up = up || (k > 0 && row > last_row);
+    down = down || (k > 0 && row < last_row);
+    last_row = row;
+  }
+  EXPECT_NE(up, down) << "far to near";
+  EXPECT_EQ(Runs(mesh, [](std::size_t) { return false; }).ends, (std::vector<std::size_t>{0, all.size()}));
+}
+
+TEST_F(DetailTest, RunsEndInTheFieldWhereTheyEndOutsideIt) {
+  RenderParams close = view_.render;
+  close.fov_deg = 25;
+  const Laparoscope scope = MakeLaparoscope(close);
+  FieldOfView field({&scope, 1});
+  MembraneMesh mesh(view_);
+  mesh.Update(xyz_);
+  const auto triangles = mesh.triangles();
+  std::vector<std::size_t> ends{0, triangles.size() / 3, triangles.size() / 2, triangles.size()};
+  const std::vector<std::size_t> before = ends;
+  std::vector<Triangle> seen;
+  ASSERT_TRUE(field.Find(mesh.positions(), triangles, Sides::kBoth, &seen, ends));
+  for (std::size_t run = 0; run < ends.size(); ++run) {
+    std::vector<Triangle> alone;
+    FieldOfView({&scope, 1}).Find(mesh.positions(), triangles.first(before[run]), Sides::kBoth, &alone);
+    EXPECT_EQ(ends[run], alone.size());
   }
 }
 
