@@ -123,6 +123,23 @@ TEST_F(SmoothEdgesTest, OutlinesOfInstrumentsComeNearThoseOfManySamplesAtAnySlop
   }
 }
 
+TEST_F(SmoothEdgesTest, BothEyesHaveSmoothOutlines) {
+  for (const StereoLayout layout : {StereoLayout::kSideBySide, StereoLayout::kTopBottom}) {
+    scene_.stereo = {layout, 0.005f, 0.06f};
+    const Bitmap reference = Reference(), plain = Draw(false), smooth = Draw(true);
+    const std::vector<std::size_t> border = AroundTools();
+    for (const bool second : {false, true}) {  // In the picture: right, or top.
+      std::vector<std::size_t> part;
+      for (const std::size_t pixel : border) {
+        const auto x = pixel % static_cast<std::size_t>(plain.width), y = pixel / static_cast<std::size_t>(plain.width);
+        if ((layout == StereoLayout::kSideBySide ? x >= 240 : y >= 135) == second) part.push_back(pixel);
+      }
+      ASSERT_GT(part.size(), 100u);
+      EXPECT_LT(Error(smooth, reference, part), 0.7 * Error(plain, reference, part)) << second;
+    }
+  }
+}
+
 TEST_F(SmoothEdgesTest, TheRimOfTheFieldIsAsOfManySamples) {
   const Bitmap reference = Reference();
   const std::vector<std::size_t> rim = Rim(1);
