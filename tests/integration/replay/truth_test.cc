@@ -170,6 +170,29 @@ class TruthTest : public ::testing::Test {
                   finer * static_cast<int>(scene_.render.height)});
   }
 
+  /// Masks and depth of the present moment against what OpenGL draws.
+  void ExpectAsDrawn() {
+    const Truth truth = TruthNow();
+    const render::Bitmap drawn = DrawnTruth();
+    Overlap overlap;
+    double worst_m = 0;
+    for (int y = 0; y < drawn.height; ++y) {
+      for (int x = 0; x < drawn.width; ++x) {
+        const Hit& hit = truth.raster().At(x, y);
+        const std::uint8_t* pixel =
+            &drawn.rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(drawn.width) +
+                            static_cast<std::size_t>(x))];
+        overlap.Add(truth.ClassOf(hit), pixel[2]);
+        const double depth_m = (pixel[0] + pixel[1] / 255.0) / 255;
+        if (NumberOf(truth.ClassOf(hit)) != pixel[2] || !hit.any() || AtAnEdge(truth, x, y)) continue;
+        worst_m = std::max(worst_m, std::abs(depth_m - static_cast<double>(hit.depth_m)));
+      }
+    }
+    overlap.Expect("same");
+    std::printf("depth_error_mm_max %.4f\n", 1e3 * worst_m);
+    EXPECT_LT(worst_m, 1e-4);
+  }
+
   scene::SceneData data_;
   SceneView scene_;
   std::optional<LaparoscopeView> laparoscope_;
@@ -177,24 +200,15 @@ class TruthTest : public ::testing::Test {
 
 TEST_F(TruthTest, IsWhatOpenGLDraws) {
   Show(14);  // The tent is lifted, the slit is open, both instruments are in the field.
-  const Truth truth = TruthNow();
-  const render::Bitmap drawn = DrawnTruth();
-  Overlap overlap;
-  double worst_m = 0;
-  for (int y = 0; y < drawn.height; ++y) {
-    for (int x = 0; x < drawn.width; ++x) {
-      const Hit& hit = truth.raster().At(x, y);
-      const std::uint8_t* pixel = &drawn.rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(drawn.width) +
-                                                  static_cast<std::size_t>(x))];
-      overlap.Add(truth.ClassOf(hit), pixel[2]);
-      const double depth_m = (pixel[0] + pixel[1] / 255.0) / 255;
-      if (NumberOf(truth.ClassOf(hit)) != pixel[2] || !hit.any() || AtAnEdge(truth, x, y)) continue;
-      worst_m = std::max(worst_m, std::abs(depth_m - static_cast<double>(hit.depth_m)));
-    }
-  }
-  overlap.Expect("same");
-  std::printf("depth_error_mm_max %.4f\n", 1e3 * worst_m);
-  EXPECT_LT(worst_m, 1e-4);
+  ExpectAsDrawn();
+}
+
+TEST_F(TruthTest, IsWhatOpenGLDrawsOfThePaperAsPrintedToo) {
+  scene_.thermal.model = ThermalModel::kPaper;
+  scene_.thermal.as = PaperForm::kPrinted;
+  SetLines(270);
+  Show(14);
+  ExpectAsDrawn();
 }
 
 /// Class that most of the 16 pixels of a picture of four times the lines have; none where two have as many.
