@@ -1,8 +1,9 @@
 #include "services/session/supervisor/score_sheet.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
+#include <vector>
 
 #include "services/base/core/escape.h"
 #include "services/session/supervisor/flat_json.h"
@@ -31,6 +32,16 @@ std::string Pad(const std::string& text, int columns, bool right) {
   return right ? fill + text : text + fill;
 }
 
+/// Tools of which anything was measured: those that the scene has and a hand moves.
+std::vector<std::size_t> MeasuredTools(const assessment::Figures& figures) {
+  std::vector<std::size_t> tools;
+  for (std::size_t i = 0; i < figures.tool.size(); ++i) {
+    const assessment::MeasureValues& values = figures.tool[i];
+    if (!std::all_of(values.begin(), values.end(), [](double value) { return std::isnan(value); })) tools.push_back(i);
+  }
+  return tools;
+}
+
 }  // namespace
 
 std::string SheetTable(const ScoreSheet& sheet) {
@@ -53,11 +64,14 @@ std::string SheetHtml(const ScoreSheet& sheet, const std::string& trainee) {
   const auto cell = [](const std::string& text, const char* style = "") {
     return std::string("<td") + style + ">" + EscapeHtml(text) + "</td>";
   };
+  const std::vector<std::size_t> tools = MeasuredTools(sheet.figures);
+  std::string tool_heads;
+  for (const std::size_t i : tools) tool_heads += "<th>tool " + std::to_string(i) + "</th>";
   std::string html = "<h2>Score sheet" + (trainee.empty() ? std::string() : " of " + EscapeHtml(trainee)) + "</h2>\n" +
                      "<div class='tiles'><div class='tile'><b>" + Fixed(sheet.score.percent(), 0) +
                      " <small>%</small></b><span>" + Fixed(sheet.score.points, 1) + " of " + Fixed(sheet.score.of, 0) +
                      " points</span></div></div>\n<div class='card scroll' style='margin-top:14px'><table><tr>" +
-                     "<th class='text'>measure</th><th>tool 0</th><th>tool 1</th><th>session</th><th>threshold</th>" +
+                     "<th class='text'>measure</th>" + tool_heads + "<th>session</th><th>threshold</th>" +
                      "<th class='text'>kept</th><th>points</th></tr>\n";
   for (const ScoreItem& item : sheet.score.items) {
     const MeasureInfo& info = InfoOf(item.measure);
@@ -65,7 +79,7 @@ std::string SheetHtml(const ScoreSheet& sheet, const std::string& trainee) {
     const bool scored = item.of > 0;
     html += scored ? item.passed ? "<tr>" : "<tr class='bad'>" : "<tr class='soft'>";
     html += cell(info.label + (*info.unit != '\0' ? std::string(" [") + info.unit + "]" : ""), " class='text'");
-    for (const assessment::MeasureValues& tool : sheet.figures.tool) html += cell(ValueText(info, tool[index]));
+    for (const std::size_t i : tools) html += cell(ValueText(info, sheet.figures.tool[i][index]));
     html += cell(ValueText(info, item.value)) + cell(scored ? LimitText(info, item.limit) : "") +
             cell(scored ? Mark(item) : "", " class='text'") +
             cell(scored ? Fixed(item.points, 1) + " / " + Fixed(item.of, 0) : std::string("not scored")) + "</tr>\n";

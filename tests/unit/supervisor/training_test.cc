@@ -20,8 +20,8 @@ namespace fs = std::filesystem;
 
 ScoreSheet Sheet() {
   ScoreSheet sheet;
-  for (auto* values : {&sheet.figures.session, &sheet.figures.tool[0], &sheet.figures.tool[1]})
-    values->fill(std::nan(""));
+  sheet.figures.session.fill(std::nan(""));
+  for (auto& values : sheet.figures.tool) values.fill(std::nan(""));
   const auto set = [&](Measure measure, double value) {
     sheet.figures.session[static_cast<std::size_t>(measure)] = value;
   };
@@ -52,6 +52,27 @@ TEST(ScoreSheetTest, SaysValueThresholdAndPointsEverywhere) {
   const std::string html = SheetHtml(sheet, "Ann <b>");
   EXPECT_NE(html.find("Ann &lt;b&gt;"), std::string::npos);
   EXPECT_NE(html.find("<tr class='bad'><td class='text'>peak force [N]</td>"), std::string::npos) << html;
+}
+
+std::size_t Count(const std::string& text, const std::string& part) {
+  std::size_t count = 0;
+  for (std::size_t at = 0; (at = text.find(part, at)) != std::string::npos; at += part.size()) ++count;
+  return count;
+}
+
+TEST(ScoreSheetTest, EachValueOfTheReportHasItsHead) {
+  ScoreSheet sheet = Sheet();
+  for (const std::size_t tools : {std::size_t{1}, std::size_t{2}, std::size_t{kMaxTools}}) {
+    for (auto& values : sheet.figures.tool) values.fill(std::nan(""));
+    // The last ones of the scene's places: a scene may leave places free.
+    for (std::size_t i = kMaxTools - tools; i < kMaxTools; ++i) sheet.figures.tool[i].front() = 1;
+    const std::string html = SheetHtml(sheet, "");
+    const std::size_t rows = Count(html, "<tr") - 1;  // One of them is the head.
+    EXPECT_EQ(rows, sheet.score.items.size());
+    EXPECT_EQ(Count(html, "<th>") + Count(html, "<th "), 5 + tools) << html;
+    EXPECT_EQ(Count(html, "<td"), rows * (5 + tools)) << html;
+    EXPECT_NE(html.find("<th>tool " + std::to_string(kMaxTools - tools) + "</th>"), std::string::npos) << html;
+  }
 }
 
 class TrainingLogTest : public testing::Test {
