@@ -1,7 +1,5 @@
 #include "services/apps/scene_compiler/commands.h"
 
-#include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <chrono>
 #include <condition_variable>
@@ -171,10 +169,7 @@ void Compile(const Arguments& arguments) {
 }
 
 void CheckSceneName(const std::string& option, const std::string& name) {
-  const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.'; };
-  if (name.empty() || name.size() > 63 || !std::all_of(name.begin(), name.end(), is_plain) || name[0] == '.') {
-    throw InputError(option + " '" + name + "'; valid: up to 63 letters, digits, '-', '_' and '.'");
-  }
+  if (!scene::IsSceneName(name)) throw InputError(option + " '" + name + "'; valid: " + scene::kSceneNameRule);
 }
 
 void MakeNew(const Arguments& arguments) {

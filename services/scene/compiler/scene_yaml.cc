@@ -1,6 +1,7 @@
 #include "services/scene/compiler/scene_yaml.h"
 
 #include <algorithm>
+#include <cctype>
 #include <fstream>
 #include <iterator>
 
@@ -321,6 +322,9 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const MaterialLibr
   SceneSettings scene;
   StrictMap root = yaml->root();
   scene.name = root.Text("name", 63);
+  if (!IsSceneName(scene.name)) {
+    root.Fail("name", "'" + scene.name + "' becomes the name of files and folders; valid: " + kSceneNameRule);
+  }
   scene.description = root.TextOr("description", "");
   Folders folders;
   folders.files_needed = bases.files_needed;
@@ -402,6 +406,11 @@ SceneDescription ReadFile(const std::filesystem::path& file, const std::filesyst
 SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data,
                                const std::vector<std::string>& changes) {
   return ReadFile(file, data, changes, true);
+}
+
+bool IsSceneName(std::string_view name) {
+  const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.'; };
+  return !name.empty() && name.size() <= 63 && std::all_of(name.begin(), name.end(), is_plain) && name[0] != '.';
 }
 
 std::string_view RoleName(SurfaceRole role) {

@@ -26,6 +26,10 @@ SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::fil
 /// directory.
 SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, const std::filesystem::path& data);
 
+/// True if a scene may have this name, which becomes a part of the names of files and folders.
+[[nodiscard]] bool IsSceneName(std::string_view name);
+inline constexpr const char* kSceneNameRule = "up to 63 letters, digits, '-', '_' and '.', the first no '.'";
+
 /// The word for a role in a description.
 std::string_view RoleName(SurfaceRole role);
 /// The role that a word names. Throws InputError.

@@ -182,6 +182,10 @@ TEST_P(SceneYamlRule, IsRefusedWithFileKeyAndRange) {
 }
 
 const Rule kRules[] = {
+    {"NameInAFolder", "name: small", "name: a/b", {"name", "'a/b'", "letters, digits"}},
+    {"NameAboveTheFolder", "name: small", "name: ../../../x", {"name", "'../../../x'", "letters, digits"}},
+    {"NameWithASpace", "name: small", "name: My liver", {"name", "'My liver'", "letters, digits"}},
+    {"NameThatIsHidden", "name: small", "name: .small", {"name", "'.small'", "the first no '.'"}},
     {"UnknownKey", "  rows: 73", "  rowz: 73", {"membrane", "rowz"}},
     {"UnknownSection", "haptics:", "haptix:", {"haptix"}},
     {"WrongUnit", "wall_mm: 3", "wall_mm: 3 s", {"organ.procedural.wall_mm", "wrong unit", "0.5 to 20"}},
