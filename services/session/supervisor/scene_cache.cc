@@ -42,9 +42,7 @@ std::vector<std::string> PathWords(const std::string& yaml) {
     const std::size_t end = std::min(yaml.find_first_of(kSeparators, begin), yaml.size());
     const std::string word = yaml.substr(begin, end - begin);
     begin = end;
-    if (word.find_first_of("./") != std::string::npos && word.size() <= kLongestName) {
-      words.push_back(word);
-    }
+    if (word.size() <= kLongestName) words.push_back(word);
   }
   // Quoted names may hold separators.
   for (std::size_t begin = 0; (begin = yaml.find_first_of("\"'", begin)) != std::string::npos;) {
@@ -57,50 +55,63 @@ std::vector<std::string> PathWords(const std::string& yaml) {
   return words;
 }
 
-/// Every word that names an existing file, in the scene's folder, the data folder or a folder that the YAML names,
-/// counts as an input: a superfluous input costs a compilation, a missing one would run an outdated anatomy.
-void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const SceneRequest& request,
-                     std::set<fs::path>* seen, std::set<fs::path>* folders, Hash64* hash) {
-  folders->insert(folder);
-  const fs::path& data = request.data;
+/// What a description and its bases name.
+struct Named {
+  std::set<fs::path> descriptions;  ///< The bases.
+  std::set<fs::path> folders;       ///< Of the description and its bases.
+  std::set<std::string> words;      ///< All that may name a file or folder, of all of them.
+};
+
+void AddDescription(const std::string& yaml, const fs::path& folder, const fs::path& library, Named* named) {
+  named->folders.insert(folder);
   const std::vector<std::string> words = PathWords(yaml);
-  std::vector<fs::path> bases{folder};
-  if (!data.empty()) {
-    bases.push_back(data);
-  }
-  std::error_code error;
+  named->words.insert(words.begin(), words.end());
+  const auto add_base = [&](const fs::path& file) {
+    std::error_code error;
+    if (!fs::is_regular_file(file, error)) return;
+    named->folders.insert(file.parent_path());
+    const fs::path whole = fs::canonical(file, error);  // A shipped scene is a link in a build tree.
+    if (named->descriptions.insert(whole).second) AddDescription(ReadText(file), whole.parent_path(), library, named);
+  };
   for (const std::string& word : words) {
-    if (fs::is_directory(folder / word, error)) {
-      bases.push_back(folder / word);
-    }
+    if (fs::path(word).extension() == ".yaml") add_base(folder / word);
   }
-  // The name of a shipped scene as base.
+  // The name of a shipped scene as base, or a file of another extension.
   constexpr std::string_view kBase = "\nbase:";
   if (const std::size_t at = ("\n" + yaml).find(kBase); at != std::string::npos) {
     const std::size_t begin = yaml.find_first_not_of(" \t\"'", at + kBase.size() - 1);
     const std::string name =
         begin == std::string::npos ? "" : yaml.substr(begin, yaml.find_first_of(" \t\r\n\"'#", begin) - begin);
-    const fs::path named = request.library / (name + ".yaml");
-    if (fs::is_regular_file(folder / name, error)) {
-      AddFile(hash, folder / name);
-      folders->insert((folder / name).parent_path());
-    }
-    if (fs::is_regular_file(named, error) && seen->insert(fs::canonical(named, error)).second) {
-      AddFile(hash, fs::canonical(named, error));
-      AddFilesNamedIn(ReadText(named), fs::canonical(named, error).parent_path(), request, seen, folders, hash);
+    add_base(folder / name);
+    add_base(library / (name + ".yaml"));
+  }
+}
+
+/// Every word that names an existing file, in the folder of the scene or a base, in the data folder or in a folder that
+/// a word names, counts as an input: a superfluous input costs a compilation, a missing one would run an outdated
+/// anatomy.
+std::set<fs::path> FilesOf(const Named& named, const fs::path& data) {
+  std::error_code error;
+  std::set<fs::path> places = named.folders, files = named.descriptions;
+  if (!data.empty()) places.insert(data);
+  for (const fs::path& folder : named.folders) {
+    for (const std::string& word : named.words) {
+      if (fs::is_directory(folder / word, error)) places.insert(folder / word);
     }
   }
-  for (const std::string& word : words) {
-    for (const fs::path& base : bases) {
-      if (fs::is_regular_file(base / word, error)) {
-        AddFile(hash, base / word);
-        // A base scene may name further files.
-        if (fs::path(word).extension() == ".yaml" && seen->insert(fs::canonical(base / word, error)).second) {
-          AddFilesNamedIn(ReadText(base / word), (base / word).parent_path(), request, seen, folders, hash);
-        }
+  for (const fs::path& place : places) {
+    for (const std::string& word : named.words) {
+      const fs::path file = place / word;
+      if (!fs::is_regular_file(file, error)) continue;
+      files.insert(file);
+      // A mesh of TetGen is read with the files beside it.
+      for (const char* other : {".node", ".ele", ".face"}) {
+        const fs::path companion = fs::path(file).replace_extension(other);
+        if (fs::is_regular_file(companion, error)) files.insert(companion);
       }
     }
   }
+  return files;
 }
 
 /// Every file of a folder of materials that the scene may name.
@@ -187,10 +198,12 @@ fs::path ResolveScene(const SceneRequest& request) {
     hash.Add(std::string_view(change + "\n"));
   }
   AddFile(&hash, request.compiler);
+  Named named;
+  AddDescription(yaml, source.parent_path(), request.library, &named);
+  for (const fs::path& file : FilesOf(named, request.data)) AddFile(&hash, file);
   // Materials are looked for beside the scene and its bases.
-  std::set<fs::path> seen, folders{request.library.parent_path()};
-  AddFilesNamedIn(yaml, source.parent_path(), request, &seen, &folders, &hash);
-  for (const fs::path& folder : folders) AddMaterials(folder, &hash);
+  named.folders.insert(request.library.parent_path());
+  for (const fs::path& folder : named.folders) AddMaterials(folder, &hash);
   std::array<char, 24> key{};
   std::snprintf(key.data(), key.size(), "-%016llx", static_cast<unsigned long long>(hash.value()));
   fs::path target = request.cache / (source.stem().string() + key.data() + ".fulcrum");

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
 
 #include "services/base/core/error.h"
 #include "tests/unit/supervisor/temporary_folder.h"
@@ -53,6 +54,43 @@ TEST_F(SceneCacheTest, CompilesOnceUntilAnInputChanges) {
   std::ofstream(request_.library / "one.yaml") << "name: two\n";
   (void)ResolveScene(request_);
   EXPECT_EQ(Runs(), 3);
+}
+
+TEST_F(SceneCacheTest, AMeshInAFolderOfAPlainNameIsAnInput) {
+  fs::create_directories(request_.library / "scans");
+  std::ofstream(request_.library / "scans" / "liver.stl") << "solid";
+  std::ofstream(request_.library / "plain.yaml")
+      << "name: plain\norgan:\n  import: {folders: [scans], organ: liver.stl}\n";
+  // One scene names the folder, the other one the mesh.
+  std::ofstream(request_.library / "mesh.yaml") << "name: mesh\nbase: plain\norgan: {import: {organ: spleen.stl}}\n";
+  std::ofstream(request_.library / "scans" / "spleen.stl") << "solid";
+  for (const auto& [scene, mesh] : {std::pair("plain", "liver.stl"), std::pair("mesh", "spleen.stl")}) {
+    request_.name = scene;
+    (void)ResolveScene(request_);
+    const int before = Runs();
+    (void)ResolveScene(request_);
+    EXPECT_EQ(Runs(), before) << scene;
+    std::ofstream(request_.library / "scans" / mesh) << "solid changed";
+    (void)ResolveScene(request_);
+    EXPECT_EQ(Runs(), before + 1) << scene;
+  }
+}
+
+TEST_F(SceneCacheTest, WhatBelongsToAMeshOfTetgenIsAnInput) {
+  std::ofstream(request_.library / "tet.yaml") << "name: tet\norgan: {import: {organ: liver.node}}\n";
+  for (const char* extension : {"node", "ele", "face"}) {
+    std::ofstream(request_.library / (std::string("liver.") + extension)) << "1";
+  }
+  request_.name = "tet";
+  (void)ResolveScene(request_);
+  (void)ResolveScene(request_);
+  EXPECT_EQ(Runs(), 1);
+  int runs = 1;
+  for (const char* extension : {"ele", "face", "node"}) {
+    std::ofstream(request_.library / (std::string("liver.") + extension)) << "1 changed";
+    (void)ResolveScene(request_);
+    EXPECT_EQ(Runs(), ++runs) << extension;
+  }
 }
 
 TEST_F(SceneCacheTest, ABaseByNameIsAnInput) {
