@@ -189,7 +189,7 @@ std::vector<NodeId> RestartedNodes(const std::filesystem::path& recording, const
 }  // namespace
 
 bool LockStepResult::good() const {
-  return std::all_of(nodes.begin(), nodes.end(), [](const NodeResult& node) { return node.good(); });
+  return faults.empty() && std::all_of(nodes.begin(), nodes.end(), [](const NodeResult& node) { return node.good(); });
 }
 
 LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneView& scene,
@@ -250,12 +250,7 @@ LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneVie
     }
     result.nodes.push_back(node);
   }
-  for (const recording::McapFault& fault : source.reader().faults()) {
-    result.faults.push_back("at byte " + std::to_string(fault.offset) + ": " + fault.what);
-  }
-  if (source.undecodable() > 0) {
-    result.faults.push_back(std::to_string(source.undecodable()) + " messages are not of their topic's type");
-  }
+  result.faults = source.Faults();
   return result;
 }
 

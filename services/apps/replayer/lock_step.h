@@ -63,6 +63,7 @@ struct LockStepResult {
   double wall_s = 0;
   double session_s = 0;             ///< Session time replayed.
   std::vector<std::string> faults;  ///< Unreadable parts of the recording.
+  /// True if all of the recording could be read and all states are the same.
   [[nodiscard]] bool good() const;
 };
 

@@ -31,7 +31,7 @@ std::string ReportText(const LockStepResult& result) {
     if (node.departure) text += "  first difference: " + Describe(*node.departure) + '\n';
     if (!node.missing.empty()) text += "  missing: " + node.missing + '\n';
   }
-  for (const std::string& fault : result.faults) text += "  recording: " + fault + '\n';
+  for (const std::string& fault : result.faults) text += "INCOMPLETE RECORDING: " + fault + '\n';
   text += Format("%.2f s of the session in %.2f s: %.1f x real time\n", result.session_s, result.wall_s, Speed(result));
   return text;
 }

@@ -103,8 +103,8 @@ NodeTestResult TestNode(const LockStepSettings& settings, const Demands& demands
   result.wall_s = replay.wall_s;
   if (node.ticks > 0) result.state_hash = node.state_hash;
   AddFigures(node, replay.session_s, &result.figures);
-  result.cases.push_back(
-      {"replays the whole recording", node.missing.empty() ? Verdict::kPassed : Verdict::kError, node.missing});
+  const std::string lacks = node.missing.empty() && !replay.faults.empty() ? replay.faults[0] : node.missing;
+  result.cases.push_back({"replays the whole recording", lacks.empty() ? Verdict::kPassed : Verdict::kError, lacks});
   const bool nothing_asked = !demands.state_hash && demands.assertions.empty();
   Judge(nothing_asked ? Demands{{}, {Assertion{kMismatches, Relation::kEqual, 0}}} : demands, &result);
   for (TestCase& test : result.cases) {

@@ -97,6 +97,15 @@ bool TickSource::Next(RecordedTick* tick) {
   return true;
 }
 
+std::vector<std::string> TickSource::Faults() const {
+  std::vector<std::string> faults;
+  for (const recording::McapFault& fault : reader_.faults()) {
+    faults.push_back("at byte " + std::to_string(fault.offset) + ": " + fault.what);
+  }
+  if (undecodable_ > 0) faults.push_back(std::to_string(undecodable_) + " messages are not of their topic's type");
+  return faults;
+}
+
 void TickSource::Complete(RecordedTick* tick) {
   tick->tick.index = progress_[static_cast<std::size_t>(tick->node)].index + 1;
   if (session_) {

@@ -65,9 +65,8 @@ class TickSource {
 
   /// The SceneManifest, once it was read.
   [[nodiscard]] const std::optional<SceneManifest>& session() const { return session_; }
-  [[nodiscard]] const recording::McapReader& reader() const { return reader_; }
-  /// Number of messages that could not be decoded.
-  [[nodiscard]] std::uint64_t undecodable() const { return undecodable_; }
+  /// What of the part read so far is damaged, cut off or cannot be decoded; empty: nothing.
+  [[nodiscard]] std::vector<std::string> Faults() const;
 
   /// A tick is complete when messages that are later by this time have been read [ns].
   static constexpr std::int64_t kSettle_ns = 2'000'000'000;

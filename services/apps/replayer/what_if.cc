@@ -145,6 +145,9 @@ WhatIfResult ReplayWhatIf(const LockStepSettings& settings, const SceneView& bef
   }
   comparison.Finish();
   comparison.result.wall_s = 1e-9 * static_cast<double>(runtime::MonotonicNs() - begin);
+  if (const auto faults = source.Faults(); comparison.result.missing.empty() && !faults.empty()) {
+    comparison.result.missing = "the recording, " + faults[0];
+  }
   if (comparison.result.ticks == 0 && comparison.result.missing.empty()) {
     comparison.result.missing = "the recording contains no tick of these nodes";
   }

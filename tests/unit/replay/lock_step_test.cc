@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 #include <set>
 #include <string>
 
@@ -164,6 +165,33 @@ TEST_F(LockStepTest, TellsASampleThatAKilledProcessDidNotSendToTheRecorder) {
   const LockStepResult result = Replay({NodeId::kPhysics});
   EXPECT_NE(result.nodes[0].missing.find(left_out), std::string::npos) << ReportText(result);
   EXPECT_NE(result.nodes[0].missing.find("the last of its process"), std::string::npos) << ReportText(result);
+}
+
+/// Position in a recording [B].
+std::uint64_t MiddleOfLastChunk(const std::filesystem::path& recording) {
+  constexpr char kChunk = 6;
+  std::ifstream in(recording, std::ios::binary);
+  std::uint64_t middle = 0, at = 8;  // Behind the magic bytes.
+  for (;;) {
+    char kind = 0;
+    std::uint64_t length = 0;
+    in.seekg(static_cast<std::streamoff>(at));
+    if (!in.get(kind) || !in.read(reinterpret_cast<char*>(&length), sizeof length)) return middle;
+    at += 1 + sizeof length;
+    if (kind == kChunk) middle = at + length / 2;
+    at += length;
+  }
+}
+
+TEST_F(LockStepTest, ARecordingThatIsCutShortInARecordIsIncomplete) {
+  Record({.seconds = 2});
+  ASSERT_TRUE(Replay({NodeId::kThermal}).good());
+  const std::filesystem::path recording = folder_ / "recording.mcap";
+  std::filesystem::resize_file(recording, MiddleOfLastChunk(recording));
+  const LockStepResult result = Replay({NodeId::kThermal});
+  EXPECT_TRUE(result.nodes[0].good()) << "what can be read is the same: " << ReportText(result);
+  EXPECT_FALSE(result.good());
+  EXPECT_NE(ReportText(result).find("INCOMPLETE RECORDING: at byte"), std::string::npos) << ReportText(result);
 }
 
 TEST_F(LockStepTest, AnotherSceneIsRefused) {
