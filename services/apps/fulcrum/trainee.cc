@@ -69,8 +69,8 @@ ExitCode Delete(const std::string& name, const Arguments& arguments) {
   for (const fs::path& file : traces) RemoveName(file, name);
   const int deleted = log.Delete(name);
   std::printf(
-      "deleted %d rows; recordings and pictures carry no name and stay; copies, plots (--svg) and backups are "
-      "yours to delete\n",
+      "deleted %d rows; recordings and pictures carry no name and stay, but recordings of an earlier build may have it "
+      "in the command lines of their channels; those, copies, plots (--svg) and backups are yours to delete\n",
       deleted);
   return ExitCode::kDone;
 }

@@ -1,8 +1,6 @@
 #include "services/records/recorder/recorder_node.h"
 
-#include <algorithm>
 #include <fstream>
-#include <iterator>
 #include <string>
 #include <utility>
 
@@ -19,13 +17,13 @@ namespace {
 /// Time after its first match for which the number of a participant's matches is reported in Health.
 constexpr std::int64_t kReportsMatches_ns = 10 * kSecond_ns;
 
-/// Command line of a process; empty if it has ended.
-std::string CommandLine(int pid) {
+/// Program of a process, as it was called; empty if it has ended. Without its arguments, because those of `fulcrum up`
+/// may name a trainee.
+std::string ProgramOf(int pid) {
   std::ifstream in("/proc/" + std::to_string(pid) + "/cmdline", std::ios::binary);
-  std::string line{std::istreambuf_iterator<char>(in), {}};
-  while (!line.empty() && line.back() == '\0') line.pop_back();
-  std::replace(line.begin(), line.end(), '\0', ' ');
-  return line;
+  std::string program;
+  std::getline(in, program, '\0');
+  return program;
 }
 
 /// Lowest real-time priority: a thread that reads the bus runs before all programs that are not real-time, so that
@@ -40,7 +38,7 @@ void RunBeforeOtherPrograms() {
 }
 
 recording::TextMap Describe(const bus::Peer& peer) {
-  return {{"node", peer.name}, {"pid", std::to_string(peer.pid)}, {"command", CommandLine(peer.pid)}};
+  return {{"node", peer.name}, {"pid", std::to_string(peer.pid)}, {"command", ProgramOf(peer.pid)}};
 }
 
 /// Settings of a second participant: that of the app has typed ports of some topics, and a participant can register a

@@ -72,6 +72,12 @@ TEST(RecordedCart, EveryTopicIsInTheFileAndDecodes) {
   }
   EXPECT_TRUE(recording.reader().closed());
   EXPECT_TRUE(recording.reader().faults().empty());
+  // The arguments of `fulcrum up` may name a trainee, who can ask for the name to be deleted.
+  for (const auto& [number, channel] : recording.reader().channels()) {
+    const std::string& command = channel.metadata.at("command");
+    EXPECT_FALSE(command.empty()) << channel.topic;
+    EXPECT_EQ(command.find("--"), std::string::npos) << channel.topic << ": " << command;
+  }
   const auto& metadata = recording.reader().metadata();
   EXPECT_EQ(std::stoull(metadata.at("session").at("scene_hash"), nullptr, 16), scene_hash);
   EXPECT_EQ(metadata.at("session").at("scene"), "small");
