@@ -54,6 +54,7 @@ class AttachedNode final : public SupervisedNode {
   [[nodiscard]] bool running() const override { return process_.pid() != 0; }
   [[nodiscard]] bool failed() const override { return failed_; }
   [[nodiscard]] bool has_reported() const override { return has_reported_; }
+  [[nodiscard]] bool steps() const override { return has_reported_; }  // There are no pairs of services.
   [[nodiscard]] const NodeCommand& command() const override { return command_; }
   [[nodiscard]] std::string log() const override;
 

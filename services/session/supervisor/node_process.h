@@ -35,6 +35,7 @@ class NodeProcess final : public SupervisedNode {
   [[nodiscard]] bool running() const override { return process_.running(); }
   [[nodiscard]] bool failed() const override { return failed_; }
   [[nodiscard]] bool has_reported() const override { return pulse_.has_reported(); }
+  [[nodiscard]] bool steps() const override { return pulse_.steps(); }
   [[nodiscard]] const NodeCommand& command() const override { return command_; }
   [[nodiscard]] std::string log() const override { return command_.log.string(); }
 

@@ -20,6 +20,8 @@ class NodePulse {
   /// @param has_spare another process can take its place at once.
   [[nodiscard]] const char* Complaint(bool has_spare, std::int64_t now_ns) const;
   [[nodiscard]] bool has_reported() const { return has_reported_; }
+  /// Its newest Health says that it runs.
+  [[nodiscard]] bool steps() const { return steps_; }
 
  private:
   std::int64_t timeouts_reset_ns_ = 0;  ///< No complaint before this time.
@@ -27,7 +29,7 @@ class NodePulse {
   std::int64_t period_ns_ = 0;
   std::uint64_t ticks_ = 0;
   bool has_reported_ = false;
-  bool steps_ = false;  ///< Its newest Health says that it runs.
+  bool steps_ = false;
 };
 
 }  // namespace fulcrum::supervisor

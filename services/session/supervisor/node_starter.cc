@@ -51,6 +51,11 @@ NodeCommand NodeStarter::InPair(const std::string& seat, bool follows) const {
 }
 
 NodeCommand NodeStarter::Replacement(const NodeCommand& now, const std::vector<std::string>& words) const {
+  if (settings.standby && now.id == NodeId::kPhysics) {
+    throw InputError(
+        "physics_node of this session runs twice (--standby): a replacement would only follow the other one; nothing "
+        "was changed. Start a session without --standby");
+  }
   const std::string kind = words.empty() ? std::string() : words.front();
   if (kind == "build" && words.size() == 2) return CommandFrom(now, {BuildOf(now.id, words[1]).string()});
   if (kind == "recording" && words.size() == 2) {

@@ -19,7 +19,8 @@ struct NodeStarter {
   [[nodiscard]] NodeCommand Usual(NodeId id) const;
   /// Command of one of two physics nodes. After a restart it follows, because the other one leads by then.
   [[nodiscard]] NodeCommand InPair(const std::string& seat, bool follows) const;
-  /// Command that replaces a node that was started by `now`. Throws InputError when it cannot be run or is not allowed.
+  /// Command that replaces a node that was started by `now`. Throws InputError when it cannot be run or is not allowed,
+  /// and for one of two physics nodes.
   /// @param words by what:
   ///   "build" NAME: another build of the node, in NAME/bin of the folder that the cart file names; with the node's
   ///   arguments;

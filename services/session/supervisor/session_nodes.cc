@@ -17,6 +17,15 @@ constexpr std::int64_t kExcuse_ns = 3 * kSecond_ns;
 
 }  // namespace
 
+SupervisedNode* FindRunning(std::span<const std::unique_ptr<SupervisedNode>> nodes, std::string_view name) {
+  SupervisedNode* found = nullptr;
+  for (const auto& node : nodes) {
+    if (name != NodeName(node->id()) || !node->running()) continue;
+    if (found == nullptr || (node->steps() && !found->steps())) found = node.get();
+  }
+  return found;
+}
+
 SessionNodes::SessionNodes(const SessionSetup& setup, const AttachedNode::Order& order) : setup_(setup) {
   const UpSettings& up = setup.settings;
   for (const NodeId id : setup.node_ids) {
@@ -71,7 +80,7 @@ void SessionNodes::End(const std::function<void(std::int64_t now_ns)>& turn,
 }
 
 std::optional<CommandAnswer> SessionNodes::Restart(const std::string& name, std::int64_t now_ns) {
-  SupervisedNode* node = FindRunning(name);
+  SupervisedNode* node = FindRunning(nodes_, name);
   if (node == nullptr) return std::nullopt;
   CommandAnswer answer{true, "restarting " + name + " (pid " + std::to_string(node->pid()) + ")"};
   node->AskRestart(now_ns);
@@ -84,7 +93,7 @@ CommandAnswer SessionNodes::Swap(const std::string& argument, std::int64_t now_n
   std::istringstream lines(argument);
   for (std::string word; std::getline(lines, word);) words.push_back(std::move(word));
   const std::string name = words.empty() ? std::string() : words.front();
-  SupervisedNode* node = FindRunning(name);
+  SupervisedNode* node = FindRunning(nodes_, name);
   if (node == nullptr) return NotRunning(name);
   try {
     words.erase(words.begin());
@@ -111,12 +120,6 @@ bool SessionNodes::AreReady() const {
 std::size_t SessionNodes::running() const {
   return static_cast<std::size_t>(
       std::count_if(nodes_.begin(), nodes_.end(), [](const auto& node) { return node->running(); }));
-}
-
-SupervisedNode* SessionNodes::FindRunning(std::string_view name) {
-  const auto found =
-      std::find_if(nodes_.begin(), nodes_.end(), [&](const auto& node) { return name == NodeName(node->id()); });
-  return found != nodes_.end() && (*found)->running() ? found->get() : nullptr;
 }
 
 }  // namespace fulcrum::supervisor

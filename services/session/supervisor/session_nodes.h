@@ -18,6 +18,10 @@
 
 namespace fulcrum::supervisor {
 
+/// The running node of this name, of a standby pair the one that leads; nullptr: none runs.
+[[nodiscard]] SupervisedNode* FindRunning(std::span<const std::unique_ptr<SupervisedNode>> nodes,
+                                          std::string_view name);
+
 class SessionNodes {
  public:
   /// @param setup must outlive this.
@@ -36,7 +40,7 @@ class SessionNodes {
   void End(const std::function<void(std::int64_t now_ns)>& turn,
            const std::function<void(const SupervisedNode& node, const char* done)>& given_up);
 
-  /// Restart by command. nullopt: no such node runs here.
+  /// Restart by command, of a standby pair the one that leads. nullopt: no such node runs here.
   [[nodiscard]] std::optional<CommandAnswer> Restart(const std::string& name, std::int64_t now_ns);
   /// Swap by command. @param argument the node, then the words of NodeStarter::Replacement, one per line.
   CommandAnswer Swap(const std::string& argument, std::int64_t now_ns);
@@ -59,8 +63,6 @@ class SessionNodes {
   [[nodiscard]] const Failure& failure() const { return failure_; }
 
  private:
-  [[nodiscard]] SupervisedNode* FindRunning(std::string_view name);
-
   const SessionSetup& setup_;
   std::vector<std::unique_ptr<SupervisedNode>> nodes_;
   std::int64_t last_watch_ns_ = 0;

@@ -61,6 +61,8 @@ class SupervisedNode {
   [[nodiscard]] virtual bool running() const = 0;
   [[nodiscard]] virtual bool failed() const = 0;
   [[nodiscard]] virtual bool has_reported() const = 0;
+  /// True when its newest Health says that it runs, and not that it waits: of a standby pair, the one that leads.
+  [[nodiscard]] virtual bool steps() const = 0;
   [[nodiscard]] virtual const NodeCommand& command() const = 0;
   /// Where its output can be read: a file, or a command.
   [[nodiscard]] virtual std::string log() const = 0;

@@ -5,14 +5,18 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "services/base/core/error.h"
 #include "services/base/runtime/child_process.h"
 #include "services/session/supervisor/attached_node.h"
+#include "services/session/supervisor/node_process.h"
 #include "services/session/supervisor/restart_policy.h"
+#include "services/session/supervisor/session_nodes.h"
 #include "tests/unit/supervisor/temporary_folder.h"
 
 namespace fulcrum::supervisor {
@@ -130,6 +134,41 @@ TEST_F(AttachedNodeTest, HasFailedForGoodWhenItStaysAway) {
   ASSERT_TRUE(death.has_value());
   EXPECT_TRUE(death->for_good);
   EXPECT_TRUE(node_.failed());
+}
+
+// -------------------------------------------------------------------------------------------------- standby pair
+
+TEST(StandbyPair, ACommandReachesTheProcessThatLeads) {
+  const TemporaryFolder folder;
+  std::vector<std::unique_ptr<SupervisedNode>> nodes;
+  for (const char* seat : {"a", "b"}) {
+    NodeCommand command;
+    command.id = NodeId::kPhysics;
+    command.program = "/bin/sleep";
+    command.arguments = {"600"};
+    command.log = folder.path() / seat;
+    nodes.push_back(std::make_unique<NodeProcess>(command));
+    nodes.back()->Start(kMs);
+  }
+  const auto report = [&](std::size_t seat, HealthState state) {
+    Health health;
+    health.node = NodeId::kPhysics;
+    health.pid = nodes[seat]->pid();
+    health.state = state;
+    EXPECT_TRUE(nodes[seat]->OnHealth(health, 2 * kMs));
+  };
+  EXPECT_EQ(FindRunning(nodes, "physics_node"), nodes[0].get()) << "none leads yet";
+  report(0, HealthState::kRunning);
+  report(1, HealthState::kWaiting);
+  EXPECT_EQ(FindRunning(nodes, "physics_node"), nodes[0].get());
+  report(0, HealthState::kWaiting);
+  report(1, HealthState::kDegraded);
+  EXPECT_EQ(FindRunning(nodes, "physics_node"), nodes[1].get());
+  EXPECT_EQ(FindRunning(nodes, "thermal_node"), nullptr);
+  report(0, HealthState::kRunning);
+  nodes[0]->StopWaiting();
+  while (!nodes[0]->HasEnded()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_EQ(FindRunning(nodes, "physics_node"), nodes[1].get()) << "the other one is dead";
 }
 
 // ------------------------------------------------------------------------------------------------ restart policy

@@ -93,6 +93,19 @@ TEST_F(Swap, ARecordingIsPlayedByTheOwnReplayer) {
   EXPECT_NE(Refusal({"recording", (root_ / "none.mcap").string()}).find("is no recording"), std::string::npos);
 }
 
+TEST_F(Swap, OneOfTwoPhysicsNodesIsNotReplaced) {
+  Program(root_ / "own" / "physics_node");
+  EXPECT_NO_THROW((void)starter_.Replacement(starter_.Usual(NodeId::kPhysics), {"build", "own"}));
+  settings_.standby = true;
+  try {
+    (void)starter_.Replacement(starter_.InPair("a", false), {"build", "own"});
+    ADD_FAILURE() << "the replacement would follow and change nothing";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("--standby"), std::string::npos) << error.what();
+  }
+  EXPECT_EQ(Refusal({"build", "own"}), "") << "other nodes are replaced as ever";
+}
+
 TEST_F(Swap, NothingElseIsTaken) {
   for (const std::vector<std::string>& words : {std::vector<std::string>{},
                                                 {"build"},
