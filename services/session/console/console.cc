@@ -97,7 +97,10 @@ struct Console::Impl {
         server({.address = given.bind, .port = given.port, .tls = Identity()},
                {.handle = [this](const HttpRequest& request) { return Handle(request); },
                 .knows = [this](const HttpRequest& request) { return access->HasToken(request); }}) {
-    watch.OnLeave([this] { live.SetSession({}); });
+    watch.OnLeave([this] {
+      live.SetSession({});
+      live_session = 0;  // A session whose supervisor was silent for a while is joined again.
+    });
     token_file = settings.token_file.empty() ? DefaultTokenFile(server.port()) : settings.token_file;
     std::error_code error;
     if (!settings.token_file.empty() && fs::exists(token_file, error)) {

@@ -1,6 +1,7 @@
 // `fulcrum console` as used by a stranger, by its page and by an operator: a real server, real sessions, a raw client.
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -188,6 +189,31 @@ TEST_F(ConsoleTest, ASessionOutlivesItsConsoleAndIsFoundAgain) {
   EXPECT_TRUE(WaitFor(10, [&] { return Says(again, {"\"picture\":\"frame_"}); }));
   EXPECT_EQ(again.Post("/api/stop").status, 200);
   EXPECT_TRUE(WaitFor(30, [&] { return Says(again, {"\"phase\":\"idle\"", "\"has_report\":true"}); }));
+}
+
+TEST_F(ConsoleTest, TheLivePictureReturnsAfterTheConsoleHadNoDescriptorsForAWhile) {
+  ConsoleProgram console(kDomain, out(), Token());
+  EXPECT_EQ(console.Post("/api/start", "scene=small&seconds=60&record=off").status, 200);
+  ASSERT_TRUE(WaitFor(60, [&] { return Says(console, {"\"phase\":\"running\""}); }))
+      << ReadFile(out() + "/console.log");
+  const std::string ticket = Between(console.Post("/api/ticket").body, "\"text\":\"", "\"");
+  const std::string host = "127.0.0.1:" + std::to_string(console.port());
+  HttpConnection page(console.port());
+  page.Send("GET /live?ticket=" + ticket + " HTTP/1.1\r\nHost: " + host + "\r\nOrigin: http://" + host +
+            "\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n" +
+            "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n");
+  const std::string there = "\"ready\":true", gone = "\"ready\":false";
+  ASSERT_NE(page.Receive(20, there).find(there), std::string::npos);
+  // Without a descriptor it cannot ask for the supervisor, and leaves the session.
+  rlimit before{};
+  ASSERT_EQ(::prlimit(console.program().pid(), RLIMIT_NOFILE, nullptr, &before), 0);
+  const rlimit none{.rlim_cur = 3, .rlim_max = before.rlim_max};
+  ASSERT_EQ(::prlimit(console.program().pid(), RLIMIT_NOFILE, &none, nullptr), 0);
+  EXPECT_NE(page.Receive(20, gone).find(gone), std::string::npos);
+  ASSERT_EQ(::prlimit(console.program().pid(), RLIMIT_NOFILE, &before, nullptr), 0);
+  EXPECT_NE(page.Receive(20, there).find(there), std::string::npos) << console.Get("/api/state").body;
+  EXPECT_EQ(console.Post("/api/stop").status, 200);
+  EXPECT_TRUE(WaitFor(30, [&] { return Says(console, {"\"phase\":\"idle\""}); }));
 }
 
 TEST_F(ConsoleTest, ACalibrationIsLedStepByStep) {
