@@ -127,6 +127,8 @@ const char* PhaseOf(const LiveState& state) {
     const Health& supervisor = state.watch->health(NodeId::kSupervisor);
     return supervisor.pid != 0 && supervisor.state == HealthState::kStopping ? "stopping" : "running";
   }
+  // The session has left the bus by itself, and its report is being written.
+  if (state.run->begun()) return "stopping";
   return state.watch->alive() || state.run->running() ? "starting" : "idle";
 }
 

@@ -68,7 +68,7 @@ SessionRun::SessionRun(SessionRunSettings settings)
 void SessionRun::Start(const SessionOrder& order) {
   runtime::WritePrivateFile(log_, "", "log");
   up_ = runtime::ChildProcess::Start(settings_.program, UpWords(settings_, order), log_, runtime::WithParent::kStays);
-  stopping_ = false;
+  stopping_ = begun_ = false;
   recording_ = order.record;
   end_.reset();
 }
@@ -81,7 +81,7 @@ void SessionRun::Stop() {
 void SessionRun::Poll() {
   const auto end = up_.Poll();
   if (!end) return;
-  stopping_ = false;
+  stopping_ = begun_ = false;
   const bool well = end->signal == 0 && end->exit_code == 0;
   const std::string reason = well ? "" : Reason(log_);
   end_ = SessionEnd{well, well ? "All went well." : reason.empty() ? "fulcrum up " + end->Describe() : reason};

@@ -48,9 +48,13 @@ class SessionRun {
   void Stop();
   /// Detects the end of the session.
   void Poll();
+  /// The session is seen on the bus: its nodes are ready.
+  void NoteBegun() { begun_ = up_.running(); }
 
   [[nodiscard]] bool running() const { return up_.running(); }
   [[nodiscard]] bool stopping() const { return stopping_; }
+  /// True from the beginning of the session until `fulcrum up` has ended: it still writes its report after the session.
+  [[nodiscard]] bool begun() const { return begun_; }
   [[nodiscard]] bool recording() const { return running() && recording_; }
   [[nodiscard]] const SessionRunSettings& settings() const { return settings_; }
   /// Newest line of the output of `fulcrum up`.
@@ -64,7 +68,7 @@ class SessionRun {
   SessionRunSettings settings_;
   std::filesystem::path log_;
   runtime::ChildProcess up_;
-  bool stopping_ = false, recording_ = false;
+  bool stopping_ = false, begun_ = false, recording_ = false;
   std::optional<SessionEnd> end_;
 };
 

@@ -14,6 +14,7 @@
 #include "services/session/console/advice.h"
 #include "services/session/console/form.h"
 #include "services/session/console/library.h"
+#include "services/session/console/live_state.h"
 #include "services/session/console/page.h"
 #include "services/session/console/router.h"
 #include "services/session/console/screen_text.h"
@@ -372,6 +373,39 @@ TEST(SessionRun, WordsOfAnOrder) {
   const std::vector<std::string> words = UpWords(settings, order);
   const std::vector<std::string> scored{"--trainee", "Ann", "--database", "/d.sqlite"};
   EXPECT_TRUE(std::equal(scored.begin(), scored.end(), words.end() - 4));
+}
+
+TEST(LiveState, ASessionThatWritesItsReportIsNotStarting) {
+  const fs::path folder = fs::temp_directory_path() / ("console_run_test." + std::to_string(::getpid()));
+  fs::create_directories(folder);
+  std::ofstream(folder / "fulcrum") << "#!/bin/sh\nread -r line < " << (folder / "report").string() << "\n";
+  fs::permissions(folder / "fulcrum", fs::perms::owner_all);
+  ASSERT_EQ(::mkfifo((folder / "report").c_str(), 0600), 0);
+  constexpr int kQuietDomain = 99;
+  SessionRun run({.program = folder / "fulcrum",
+                  .out = folder / "out",
+                  .cart = {},
+                  .data = {},
+                  .database = {},
+                  .domain = kQuietDomain});
+  const SessionWatch watch(kQuietDomain);
+  const auto phase = [&] {
+    LiveState state;
+    state.watch = &watch;
+    state.run = &run;
+    std::uint64_t cursor = 0;
+    const std::string json = LiveJson(state, &cursor);
+    return json.substr(0, json.find(','));
+  };
+  EXPECT_EQ(phase(), R"({"phase":"idle")");
+  run.Start({.scene = "small", .power_W = {}, .seconds = {}, .picture_rate_Hz = {}, .trainee = {}});
+  EXPECT_EQ(phase(), R"({"phase":"starting")");
+  run.NoteBegun();
+  EXPECT_EQ(phase(), R"({"phase":"stopping")") << "it is on the bus no more";
+  std::ofstream(folder / "report") << "written\n";
+  while (run.running()) run.Poll();
+  EXPECT_EQ(phase(), R"({"phase":"idle")");
+  fs::remove_all(folder);
 }
 
 }  // namespace
