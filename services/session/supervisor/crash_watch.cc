@@ -78,6 +78,7 @@ int DomainOfName(const std::string& name) {
 /// Memory that supervisor and watching process share. Relaxed: numbers that publish no other data.
 struct CrashWatch::Shared {
   std::array<std::atomic<pid_t>, kMostChildren> children;
+  std::atomic<bool> done;
 
   /// Runs in the watching process.
   void KillChildren() const {
@@ -135,6 +136,13 @@ CrashWatch::CrashWatch(int domain, fs::path memory, SessionFolder folder)
   StandAlone(&self);
   for (pollfd ended{self, POLLIN, 0}; ::poll(&ended, 1, -1) < 0 && errno == EINTR;) {
   }
+  if (shared_->done.load(std::memory_order_relaxed)) {
+    std::fprintf(stderr,
+                 "fulcrum: the supervisor (pid %d) was killed after session %s had ended: what it was still writing, "
+                 "the report or the video, is missing\n",
+                 static_cast<int>(supervisor), folder_.session_id.c_str());
+    ::_exit(0);
+  }
   shared_->KillChildren();
   const int files = Remove(domain_, memory_, folder_);
   std::fprintf(stderr,
@@ -156,6 +164,11 @@ CrashWatch::~CrashWatch() {
 
 void CrashWatch::Note(std::size_t place, pid_t child) noexcept {
   if (place < kMostChildren) shared_->children[place].store(child, std::memory_order_relaxed);
+}
+
+void CrashWatch::Done() noexcept {
+  done_ = true;
+  shared_->done.store(true, std::memory_order_relaxed);
 }
 
 void SweepKilledSessions(int own) {

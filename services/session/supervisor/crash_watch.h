@@ -30,8 +30,9 @@ class CrashWatch {
   /// Children die with the supervisor anyway (PR_SET_PDEATHSIG), except programs with capabilities and what a child has
   /// started itself.
   void Note(std::size_t place, pid_t child) noexcept;
-  /// The session has removed everything itself.
-  void Done() noexcept { done_ = true; }
+  /// The session has ended its children and removed everything itself: from now on the watching process ends no
+  /// process, since numbers of ended ones may belong to others by then, and only says that the supervisor was killed.
+  void Done() noexcept;
 
   /// The watching process.
   [[nodiscard]] pid_t pid() const { return watcher_; }
