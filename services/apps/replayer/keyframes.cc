@@ -17,6 +17,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "services/base/runtime/realtime.h"
+
 namespace fulcrum::replay {
 namespace {
 
@@ -55,8 +57,9 @@ struct News {
 // Longest time from the end of a process to the first message of the process that it has woken [ms].
 constexpr int kHandover_ms = 2000;
 
-/// Exit code of the replay; 1 when the running process died without sending one. The running process is watched through
-/// a pidfd, because the sleeping ones keep the pipe open after its death.
+/// Exit code of the replay; 1 when the running process died without sending one, and after SIGINT or SIGTERM, which
+/// ends the running process, too. The running process is watched through a pidfd, because the sleeping ones keep the
+/// pipe open after its death.
 int AwaitVerdict(int pipe) {
   int running = -1;
   int code = 1;
@@ -64,6 +67,10 @@ int AwaitVerdict(int pipe) {
   for (;;) {
     std::array<pollfd, 2> waits{{{pipe, POLLIN, 0}, {died ? -1 : running, POLLIN, 0}}};
     const int ready = ::poll(waits.data(), waits.size(), died ? kHandover_ms : -1);
+    if (runtime::ShouldStop()) {
+      if (running >= 0) (void)::syscall(SYS_pidfd_send_signal, running, SIGTERM, nullptr, 0);
+      break;
+    }
     if (ready < 0 && errno == EINTR) continue;
     if (ready <= 0) break;
     if (waits[0].revents != 0) {
@@ -104,9 +111,12 @@ int Keyframes::Run(const std::function<int(Keyframes*)>& body) {
   }
   ::close(lifeline.read);
   ::close(verdict.write);
+  // Only here: the processes of the replay die of a signal, and the caller removes what they have left.
+  runtime::InstallStopSignals();
   const int code = AwaitVerdict(verdict.read);
   ::close(verdict.read);
   ::close(lifeline.write);  // All sleeping keyframes end.
+  if (runtime::ShouldStop()) ::kill(first, SIGTERM);
   int status = 0;
   while (::waitpid(first, &status, 0) < 0 && errno == EINTR) {
   }

@@ -3,6 +3,9 @@
 
 #include <cstdio>
 #include <functional>
+#include <stdexcept>
+
+#include "services/base/runtime/realtime.h"
 
 namespace fulcrum::replay {
 
@@ -23,5 +26,15 @@ class ProgressLine {
  private:
   bool quiet_;
 };
+
+/// From now on SIGINT and SIGTERM end a replay through the exception that the returned function throws, so that neither
+/// half a file nor a temporary folder remains. The function shows the progress, too.
+[[nodiscard]] inline std::function<void(double)> UntilStopped(const ProgressLine& progress) {
+  runtime::InstallStopSignals();
+  return [show = progress.callback()](double time_s) {
+    if (runtime::ShouldStop()) throw std::runtime_error("stopped");
+    if (show) show(time_s);
+  };
+}
 
 }  // namespace fulcrum::replay

@@ -5,7 +5,6 @@
 
 #include <functional>
 #include <iostream>
-#include <stdexcept>
 
 #include "services/apps/replayer/changed_scene.h"
 #include "services/apps/replayer/console.h"
@@ -22,7 +21,6 @@
 #include "services/base/config/strict_yaml.h"
 #include "services/base/core/error.h"
 #include "services/base/core/exit_code.h"
-#include "services/base/runtime/realtime.h"
 #include "services/scene/format/scene_file.h"
 
 namespace fulcrum::replay {
@@ -44,18 +42,20 @@ void LeaveOutMissing(const SceneView& scene, bool pictures, std::vector<NodeId>*
 }
 
 /// Draws the pictures; returns how many were written.
-std::uint64_t DrawPictures(const Options& options, const SceneView& scene, const ProgressLine& progress) {
+std::uint64_t DrawPictures(const Options& options, const SceneView& scene, const ProgressLine& progress,
+                           const std::function<void(double)>& told) {
   const PicturesSettings settings{options.lock_step.recording, options.frames, options.lock_step.until_s};
-  const std::uint64_t written = ReplayPictures(settings, scene, progress.callback()).written;
+  const std::uint64_t written = ReplayPictures(settings, scene, told).written;
   progress.Clear();
   std::cout << written << " pictures in " << options.frames.string() << '\n';
   return written;
 }
 
 ExitCode CompareWithChanges(const Options& options, const LockStepSettings& settings, const scene::SceneFile& scene,
-                            const config::CartConfig& cart, const ProgressLine& progress) {
+                            const config::CartConfig& cart, const ProgressLine& progress,
+                            const std::function<void(double)>& told) {
   const SceneView changed = WithChanges(scene, options.changes);
-  const WhatIfResult result = ReplayWhatIf(settings, scene.view(), changed, cart, progress.callback());
+  const WhatIfResult result = ReplayWhatIf(settings, scene.view(), changed, cart, told);
   progress.Clear();
   std::cout << ReportText(result, settings.nodes);
   if (!options.json.empty()) WriteReportJson(result, options.json);
@@ -63,8 +63,9 @@ ExitCode CompareWithChanges(const Options& options, const LockStepSettings& sett
 }
 
 ExitCode CompareWithRecording(const Options& options, const LockStepSettings& settings, const SceneView& scene,
-                              const config::CartConfig& cart, const ProgressLine& progress) {
-  const LockStepResult result = ReplayInLockStep(settings, scene, cart, progress.callback());
+                              const config::CartConfig& cart, const ProgressLine& progress,
+                              const std::function<void(double)>& told) {
+  const LockStepResult result = ReplayInLockStep(settings, scene, cart, told);
   progress.Clear();
   std::cout << ReportText(result);
   if (!options.json.empty()) WriteReportJson(result, options.json);
@@ -77,16 +78,11 @@ void GoSecond() {
   (void)::setpriority(PRIO_PROCESS, 0, kNice);
 }
 
-/// For long work into files: they are as private as recordings, and a signal ends it through the exception that the
-/// returned function throws, so that no half file remains.
+/// For long work into files, which are as private as recordings. Returns UntilStopped().
 std::function<void(double)> BeginFiles(const ProgressLine& progress) {
   GoSecond();
   ::umask(077);
-  runtime::InstallStopSignals();
-  return [show = progress.callback()](double time_s) {
-    if (runtime::ShouldStop()) throw std::runtime_error("stopped");
-    if (show) show(time_s);
-  };
+  return UntilStopped(progress);
 }
 
 /// What the scene's description says of it, if the scene has one, otherwise its name.
@@ -171,13 +167,14 @@ int RunReplay(const Options& options) {
   // only.
   if (options.console) return RunConsole(settings, scene.view(), cart);
   const ProgressLine progress(options.quiet);
+  const std::function<void(double)> told = UntilStopped(progress);
   if (options.pictures) {
-    const std::uint64_t written = DrawPictures(options, scene.view(), progress);
+    const std::uint64_t written = DrawPictures(options, scene.view(), progress, told);
     if (settings.nodes.empty()) return static_cast<int>(written > 0 ? ExitCode::kDone : ExitCode::kFailure);
   }
   return static_cast<int>(options.changes.empty()
-                              ? CompareWithRecording(options, settings, scene.view(), cart, progress)
-                              : CompareWithChanges(options, settings, scene, cart, progress));
+                              ? CompareWithRecording(options, settings, scene.view(), cart, progress, told)
+                              : CompareWithChanges(options, settings, scene, cart, progress, told));
 }
 
 }  // namespace fulcrum::replay

@@ -58,7 +58,7 @@ int RunTest(const Options& options) {
     const config::CartConfig cart = LoadCart(options);
     const ScratchFolder scratch;
     const ProgressLine progress(options.quiet);
-    const NodeTestResult result = Test(options, scratch.path(), scene.view(), cart, progress.callback());
+    const NodeTestResult result = Test(options, scratch.path(), scene.view(), cart, UntilStopped(progress));
     progress.Clear();
     std::cout << ReportText(result);
     report(result);

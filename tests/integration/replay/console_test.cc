@@ -1,7 +1,15 @@
 // The replayer's console as a program: its commands through a pipe.
 #include <gtest/gtest.h>
+#include <pty.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
+#include <filesystem>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <vector>
@@ -11,6 +19,50 @@
 
 namespace fulcrum::replay {
 namespace {
+
+namespace fs = std::filesystem;
+
+/// Number of entries of a folder.
+std::ptrdiff_t CountIn(const fs::path& folder) {
+  return std::distance(fs::directory_iterator(folder), fs::directory_iterator());
+}
+
+/// A replay of which a person types the commands; what it prints is read until it ends.
+class Typed {
+ public:
+  Typed(const fs::path& recording, const std::string& keys) {
+    const std::string program = fs::path(FULCRUM_BIN_DIR) / "replayer", file = recording;
+    pid_ = ::forkpty(&terminal_, nullptr, nullptr, nullptr);
+    if (pid_ == 0) {
+      ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+      ::execl(program.c_str(), "replayer", file.c_str(), "--into", "physics", "--console", nullptr);
+      ::_exit(127);
+    }
+    Type(keys);
+  }
+  ~Typed() { ::close(terminal_); }
+  Typed(const Typed&) = delete;
+  Typed& operator=(const Typed&) = delete;
+
+  void Type(const std::string& keys) const {
+    EXPECT_EQ(::write(terminal_, keys.data(), keys.size()), static_cast<ssize_t>(keys.size()));
+  }
+  [[nodiscard]] pid_t pid() const { return pid_; }
+  /// Exit code, or minus the signal; what it printed is in `said`.
+  int End(std::string* said) {
+    std::array<char, 1024> part{};
+    for (ssize_t n = 0; (n = ::read(terminal_, part.data(), part.size())) > 0;) {
+      said->append(part.data(), static_cast<std::size_t>(n));
+    }
+    int status = 0;
+    ::waitpid(pid_, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  }
+
+ private:
+  int terminal_ = -1;
+  pid_t pid_ = -1;
+};
 
 class ConsoleTest : public ::testing::Test {
  protected:
@@ -70,6 +122,52 @@ TEST_F(ConsoleTest, StopsWhereItDiffers) {
   EXPECT_NE(answer.text.find("physics_node differs from tick 300 on", first + 1), std::string::npos)
       << "the same after going back:\n"
       << answer.text;
+}
+
+/// TMPDIR is an empty folder while this exists.
+class EmptyTemporaryFolder {
+ public:
+  explicit EmptyTemporaryFolder(const fs::path& folder) : folder_(folder) {
+    fs::create_directory(folder_);
+    ::setenv("TMPDIR", folder_.c_str(), 1);
+  }
+  ~EmptyTemporaryFolder() { ::unsetenv("TMPDIR"); }
+  EmptyTemporaryFolder(const EmptyTemporaryFolder&) = delete;
+  EmptyTemporaryFolder& operator=(const EmptyTemporaryFolder&) = delete;
+  [[nodiscard]] std::ptrdiff_t count() const { return CountIn(folder_); }
+  void AwaitEntry() const {
+    for (int i = 0; i < 400 && count() == 0; ++i) ::usleep(50'000);
+    ASSERT_EQ(count(), 1);
+    ::usleep(300'000);
+  }
+
+ private:
+  fs::path folder_;
+};
+
+TEST_F(ConsoleTest, ASignalLeavesNoTemporaryFiles) {
+  const EmptyTemporaryFolder temporary(session_->folder() / "tmp");
+  for (const int signal : {SIGINT, SIGTERM}) {
+    fulcrum::testing::Program slow("replayer", {session_->recording(), "--into", "physics", "--rate", "0.2"});
+    temporary.AwaitEntry();
+    EXPECT_EQ(slow.End(signal), 1) << slow.Said();
+    EXPECT_NE(slow.Said().find("replayer: stopped"), std::string::npos) << slow.Said();
+    EXPECT_EQ(temporary.count(), 0);
+
+    Typed waits(session_->recording(), "");
+    temporary.AwaitEntry();
+    ::kill(waits.pid(), signal);
+    std::string said;
+    EXPECT_EQ(waits.End(&said), 1) << said;
+    EXPECT_EQ(temporary.count(), 0);
+  }
+  // Ctrl-C reaches all processes of the replay.
+  Typed typed(session_->recording(), "go 1.5\n");
+  temporary.AwaitEntry();
+  typed.Type("\x03");
+  std::string said;
+  EXPECT_EQ(typed.End(&said), 1) << said;
+  EXPECT_EQ(temporary.count(), 0);
 }
 
 }  // namespace
