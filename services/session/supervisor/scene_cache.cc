@@ -8,8 +8,10 @@
 #include <cstdio>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <set>
 #include <thread>
+#include <utility>
 
 #include "services/base/core/error.h"
 #include "services/base/core/hash.h"
@@ -168,6 +170,32 @@ void Compile(const SceneRequest& request, const fs::path& yaml, const fs::path& 
   }
 }
 
+/// Removes the versions of a scene that were used longest ago, with what lies beside them: logs, forecasts, and parts
+/// of compilations that were interrupted.
+void RemoveOldVersions(const fs::path& cache, const std::string& stem) {
+  constexpr std::size_t kDigits = 16;  // Of the hash; see ResolveScene.
+  struct Version {
+    fs::file_time_type used = fs::file_time_type::min();
+    std::vector<fs::path> files;
+  };
+  std::map<std::string, Version> by_key;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(cache, error)) {
+    const std::string name = entry.path().filename();
+    const std::size_t end = stem.size() + 1 + kDigits;
+    if (!name.starts_with(stem + "-") || name.find('.', stem.size()) != end) continue;
+    Version& version = by_key[name.substr(0, end)];
+    version.used = std::max(version.used, entry.last_write_time(error));
+    version.files.push_back(entry.path());
+  }
+  std::vector<Version> versions;
+  for (auto& [key, version] : by_key) versions.push_back(std::move(version));
+  std::sort(versions.begin(), versions.end(), [](const Version& a, const Version& b) { return a.used > b.used; });
+  for (std::size_t i = kKeptVersions; i < versions.size(); ++i) {
+    for (const fs::path& file : versions[i].files) fs::remove(file, error);
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> ShippedScenes(const fs::path& library) {
@@ -207,13 +235,17 @@ fs::path ResolveScene(const SceneRequest& request) {
   std::array<char, 24> key{};
   std::snprintf(key.data(), key.size(), "-%016llx", static_cast<unsigned long long>(hash.value()));
   fs::path target = request.cache / (source.stem().string() + key.data() + ".fulcrum");
-  if (!fs::is_regular_file(target)) {
-    std::error_code error;
+  std::error_code error;
+  if (fs::is_regular_file(target)) {
+    // The time of its last use.
+    fs::last_write_time(target, fs::file_time_type::clock::now(), error);
+  } else {
     fs::create_directories(request.cache, error);
     if (error) {
       throw InputError("cannot make " + request.cache.string() + ": " + error.message());
     }
     Compile(request, source, target);
+    RemoveOldVersions(request.cache, source.stem());
   }
   return target;
 }

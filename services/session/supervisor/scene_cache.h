@@ -1,6 +1,7 @@
 // The compiled file of a scene that the user names, from a cache or compiled now.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -16,8 +17,12 @@ struct SceneRequest {
   std::filesystem::path cache;       ///< Folder of compiled scenes.
 };
 
+/// Versions of one scene that the cache keeps, the last used ones: those of some changes and back again.
+inline constexpr std::size_t kKeptVersions = 8;
+
 /// The compiled file: the named file when it is compiled already, else the cached one, else one that is compiled now,
-/// which may take minutes for real anatomy. Throws InputError when there is no such scene or it does not compile.
+/// which may take minutes for real anatomy and removes all but kKeptVersions of that scene from the cache (a session
+/// has a link or copy of its own). Throws InputError when there is no such scene or it does not compile.
 [[nodiscard]] std::filesystem::path ResolveScene(const SceneRequest& request);
 
 /// Names of the shipped scenes.

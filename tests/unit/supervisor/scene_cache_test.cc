@@ -124,6 +124,38 @@ TEST_F(SceneCacheTest, MaterialsBesideTheSceneItsBasesAndTheShippedAreInputs) {
   }
 }
 
+TEST_F(SceneCacheTest, KeepsTheVersionsThatWereUsedLast) {
+  const auto write = [&](const std::string& description) {
+    std::ofstream(request_.library / "one.yaml") << "name: one\ndescription: " << description << "\n";
+  };
+  std::ofstream(request_.library / "one-more.yaml") << "name: one-more\n";
+  request_.name = "one-more";
+  const fs::path other = ResolveScene(request_);
+  request_.name = "one";
+  write("often used");
+  const fs::path often = ResolveScene(request_);
+  fs::path newest;
+  for (std::size_t i = 0; i < kKeptVersions + 5; ++i) {
+    write("change " + std::to_string(i));
+    newest = ResolveScene(request_);
+    std::ofstream(newest.string() + ".forecast1") << "forecast";
+    std::ofstream(newest.string() + ".part1") << "of an interrupted compilation";
+    write("often used");
+    EXPECT_EQ(ResolveScene(request_), often);
+  }
+  EXPECT_EQ(Runs(), static_cast<int>(kKeptVersions) + 7) << "the one in use was not compiled again";
+  EXPECT_TRUE(fs::exists(newest));
+  EXPECT_TRUE(fs::exists(other)) << "another scene";
+  std::size_t scenes = 0, beside = 0;
+  for (const auto& entry : fs::directory_iterator(request_.cache)) {
+    const std::string extension = entry.path().extension();
+    scenes += extension == ".fulcrum" ? 1 : 0;
+    beside += extension == ".forecast1" || extension == ".part1" ? 1 : 0;
+  }
+  EXPECT_EQ(scenes, kKeptVersions + 1);
+  EXPECT_EQ(beside, 2 * (kKeptVersions - 1));
+}
+
 TEST_F(SceneCacheTest, CompiledFileIsTakenAsItIs) {
   std::ofstream(folder_.path() / "ready.fulcrum") << "x";
   request_.name = (folder_.path() / "ready.fulcrum").string();
