@@ -150,14 +150,15 @@ class Console {
     return false;
   }
 
-  /// Replays until a session time, a line on standard input, or until Advance() returns false.
-  void Go(double until_s) { Go(until_s, rate_); }
-  void Go(double until_s, double rate) {
+  /// Replays until a session time, a line on standard input, or until Advance() returns false. At full speed only a
+  /// person's line pauses: in a file the next command is always there.
+  void Go(double until_s) { Go(until_s, rate_, rate_ > 0 || ::isatty(STDIN_FILENO) != 0); }
+  void Go(double until_s, double rate, bool line_pauses = false) {
     using Clock = std::chrono::steady_clock;
     if (!Peek()) return;
     const auto begin = Clock::now();
     const double first_s = time_s();
-    while (Peek() && time_s() < until_s && !(rate > 0 && LineWaits())) {
+    while (Peek() && time_s() < until_s && !(line_pauses && LineWaits())) {
       if (rate > 0) {
         std::this_thread::sleep_until(begin + std::chrono::duration_cast<Clock::duration>(
                                                   std::chrono::duration<double>((time_s() - first_s) / rate)));

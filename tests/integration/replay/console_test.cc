@@ -124,6 +124,14 @@ TEST_F(ConsoleTest, StopsWhereItDiffers) {
       << answer.text;
 }
 
+TEST_F(ConsoleTest, EnterPausesAlsoAtFullSpeed) {
+  Typed typed(session_->recording(), "step\ngo\n\nquit\n");
+  std::string said;
+  EXPECT_EQ(typed.End(&said), 0) << said;
+  EXPECT_NE(said.find("tick 0 at 0.000 s"), std::string::npos) << said;
+  EXPECT_EQ(said.find("differs from tick 300"), std::string::npos) << "it went on: " << said;
+}
+
 /// TMPDIR is an empty folder while this exists.
 class EmptyTemporaryFolder {
  public:
