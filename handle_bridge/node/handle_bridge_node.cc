@@ -22,6 +22,9 @@ constexpr float kSameAngle_rad = 0.005f;
 /// Smaller changes since the last one, up to 0.4 counts, are noise of a jaw that rests between two counts.
 constexpr float kRestingAngle_rad = 0.012f;
 
+/// Lines at another speed than the cart's are as good as any.
+bool IsInUse(LinkState state) { return state == LinkState::kOk || state == LinkState::kWrongBaud; }
+
 bool LooksTheSame(const HandleSample& a, const HandleSample& b, float angle_rad) {
   return a.present == b.present && a.quality == b.quality && std::abs(a.jaw_angle_rad - b.jaw_angle_rad) < angle_rad;
 }
@@ -136,7 +139,7 @@ void HandleBridgeNode::TakeCalibration(std::size_t tool) {
 HandleSample HandleBridgeNode::ReadHandle(std::size_t tool, double dt_s) {
   const HandleSample line = jaws_[tool] ? ReadLine(tool, dt_s) : HandleSample();
   LinkHealth& health = snapshot_.links[tool];
-  const bool by_button = buttons_.button(tool) > 0 && (!jaws_[tool] || health.state != LinkState::kOk);
+  const bool by_button = buttons_.button(tool) > 0 && (!jaws_[tool] || !IsInUse(health.state));
   health.button = by_button ? buttons_.button(tool) : 0;
   return buttons_.Jaw(tool, line, by_button, dt_s);
 }
@@ -192,7 +195,7 @@ std::uint8_t HandleBridgeNode::ReadPedals(double dt_s) {
   health.state = links_.pedal->state(pedal_.state());
   health.reconnects = links_.pedal->reconnects();
   health.totals = pedal_.totals();
-  const bool by_button = buttons_.has_pedals() && health.state != LinkState::kOk;
+  const bool by_button = buttons_.has_pedals() && !IsInUse(health.state);
   health.button = by_button ? 1 : 0;
   snapshot_.pedals = by_button ? buttons_.Pedals() : pedal_.pedals();
   return snapshot_.pedals;

@@ -139,5 +139,29 @@ TEST_F(ButtonTest, StandInForAHandleThatIsNotThere) {
   EXPECT_EQ(Error(), "");
 }
 
+TEST_F(ButtonTest, GiveWayToLinesAtAnotherSpeedThanTheCarts) {
+  Make(config::LinkKind::kSerial, config::LinkKind::kSerial);
+  for (int i = 0; i < 800; ++i) {
+    if (line_->baud == 57600) {
+      const auto text = firmware_.Line(20);
+      line_->bytes.append(text.data(), text.size());
+    } else {
+      line_->bytes.append("\xf8\x80\x78\xf8\x78\x80");
+    }
+    if (pedal_->baud == 57600) {
+      const auto pedal = FormatPedals(kPedalCut);
+      pedal_->bytes.append(pedal.data(), pedal.size());
+    } else {
+      pedal_->bytes.append("\xf8\x80\x78\xf8\x78\x80");
+    }
+    Run(1, std::array<std::uint8_t, 2>{1, 0});
+  }
+  EXPECT_EQ(Error().rfind("handle 0: wrong-baud", 0), 0u) << Error();
+  EXPECT_NE(Error().find("pedal: wrong-baud"), std::string::npos) << Error();
+  EXPECT_EQ(Error().find("meanwhile"), std::string::npos) << Error();
+  EXPECT_EQ(state_.pedals, kPedalCut);
+  EXPECT_NEAR(state_.handles[0].jaw_angle_rad, 0.349f, 0.03f) << "the handle's, though the button is held";
+}
+
 }  // namespace
 }  // namespace fulcrum::handle_bridge
