@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "handle_bridge/estimator/jaw_calibration.h"
@@ -72,6 +73,15 @@ std::vector<double> ParseAngles(const std::string& text) {
   return angles;
 }
 
+/// The cart without links but that of one handle: no other port is opened.
+config::CartConfig WithHandleAlone(config::CartConfig cart, std::size_t tool) {
+  for (std::size_t other = 0; other < cart.handles.size(); ++other) {
+    if (other != tool) cart.handles[other].kind = config::LinkKind::kNone;
+  }
+  cart.pedal.kind = config::LinkKind::kNone;
+  return cart;
+}
+
 /// Parses the options; no value if help was requested and printed.
 std::optional<Options> Parse(const std::vector<std::string>& words, std::ostream& out) {
   po::options_description known("Options");
@@ -99,9 +109,16 @@ std::optional<Options> Parse(const std::vector<std::string>& words, std::ostream
     throw InputError("--tool " + std::to_string(tool) + ": valid: 0 or 1");
   }
   options.tool = static_cast<std::size_t>(tool);
-  if (options.cart.handles[options.tool].kind == config::LinkKind::kNone) {
+  const config::LinkKind kind = options.cart.handles[options.tool].kind;
+  if (kind == config::LinkKind::kNone) {
     throw InputError("--tool " + std::to_string(tool) + ": the cart has no handle there");
   }
+  if (kind != config::LinkKind::kSerial && kind != config::LinkKind::kSimulated) {
+    throw InputError("--tool " + std::to_string(tool) +
+                     ": the cart's handle there is operated by buttons or an operator and has no jaw to measure; "
+                     "valid kinds: serial, simulated");
+  }
+  options.cart = WithHandleAlone(std::move(options.cart), options.tool);
   options.angles_deg = ParseAngles(values["angles"].as<std::string>());
   return options;
 }

@@ -158,17 +158,24 @@ TEST_F(HandleProcess, CalibrationInTheHandIsStoredAndUsedUnlessRefused) {
   const std::string silent = WriteCart("handles: {tool1: {simulated: {silent_s: [0, 99]}}}", "silent.yaml");
   const std::string noisy = WriteCart("handles: {tool0: {simulated: {noise_mV: 10}}}", "noisy.yaml");
   const std::string absent = WriteCart("handles: {tool0: {kind: none}}", "absent.yaml");
+  // The other handles and the pedal of this cart are simulated.
+  const std::string unplugged = WriteCart("handles: {tool0: {kind: serial, port: /nonexistent}}", "unplugged.yaml");
+  const std::string buttons = WriteCart("handles: {tool0: {kind: buttons}}", "buttons.yaml");
+  const std::string operated = WriteCart("handles: {tool0: {kind: operator}}", "operated.yaml");
   struct Case {
     Program process;
     int exit_code;
     const char* said;
   };
   // One line for each point, and one more for the second try of a refused one.
-  std::array<Case, 6> cases = {{
+  std::array<Case, 9> cases = {{
       {Bridge({"calibrate", "--cart", silent, "--tool", "1"}, "\n"), 1, "refused: no-data: no bytes"},
       {Bridge({"calibrate", "--cart", noisy}, "\n"), 1, "refused: too noisy"},
       {Bridge({"calibrate", "--angles", "10,12"}, "\n\n"), 1, "refused: too few counts apart"},
       {Bridge({"calibrate", "--cart", absent}), 2, "the cart has no handle there"},
+      {Bridge({"calibrate", "--cart", unplugged}, "\n"), 1, "refused: no-port: "},
+      {Bridge({"calibrate", "--cart", buttons}), 2, "no jaw to measure; valid kinds: serial, simulated"},
+      {Bridge({"calibrate", "--cart", operated}), 2, "no jaw to measure; valid kinds: serial, simulated"},
       {Bridge({"calibrate", "--angles", "10"}), 2, "valid: 2 to 9"},
       {Bridge({"calibrate", "--help"}), 0, "For each angle, set the jaw to it"},
   }};
