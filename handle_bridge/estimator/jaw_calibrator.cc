@@ -80,6 +80,9 @@ std::string JawCalibrator::Add(double angle_deg, std::span<const int> codes) {
     return Text("too noisy: the codes spread by %.2f counts (at most %.2f): hold the jaw still", spread, kMaxSpread);
   }
   for (const Hold& other : holds_) {
+    if (other.angle_deg == angle_deg) {
+      return Text("%.1f deg is another point's angle, with code %.1f: give another angle", angle_deg, other.mean_code);
+    }
     if (std::abs(hold.mean_code - other.mean_code) < kMinGap) {
       return Text("too few counts apart: %.1f from another point (at least %.0f): check the angle",
                   std::abs(hold.mean_code - other.mean_code), kMinGap);

@@ -26,7 +26,8 @@ class JawCalibrator {
   static constexpr double kMinGap = 4;
   static constexpr std::size_t kMinCodes = 100;  ///< Smallest number of readings of a hold.
 
-  /// Adds a hold at this angle. Returns an empty text if it is accepted, otherwise the reason in one line for people.
+  /// Adds a hold at an angle that no other hold has. Returns an empty text if it is accepted, otherwise the reason in
+  /// one line for people.
   [[nodiscard]] std::string Add(double angle_deg, std::span<const int> codes);
   [[nodiscard]] std::size_t size() const { return holds_.size(); }
   /// Points in ascending order of their codes. @pre size() >= 2

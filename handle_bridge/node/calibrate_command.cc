@@ -1,5 +1,6 @@
 #include "handle_bridge/node/calibrate_command.h"
 
+#include <algorithm>
 #include <atomic>
 #include <boost/program_options.hpp>
 #include <chrono>
@@ -63,6 +64,9 @@ std::vector<double> ParseAngles(const std::string& text) {
     }
     if (used == 0 || used != word.size() || !(angle >= -10 && angle <= 120)) {
       throw InputError("--angles: '" + word + "' is not an angle; valid: -10 to 120 deg, for example 0,15,30,45,60");
+    }
+    if (std::find(angles.begin(), angles.end(), angle) != angles.end()) {
+      throw InputError("--angles: '" + word + "' is given twice; each angle is one point");
     }
     angles.push_back(angle);
     at = comma + 1;

@@ -145,6 +145,16 @@ TEST(JawCalibrator, RefusesWithTheReason) {
   EXPECT_EQ(calibrator.size(), 3u);
 }
 
+TEST(JawCalibrator, RefusesAnAngleThatItHas) {
+  JawFirmware firmware({}, 3);
+  JawCalibrator calibrator;
+  EXPECT_EQ(calibrator.Add(30, Hold(&firmware, 20)), "");
+  // Two points of one angle have no slope, and no third one lies on the right side of both.
+  EXPECT_EQ(calibrator.Add(30, Hold(&firmware, 40)).rfind("30.0 deg is another point's angle", 0), 0u);
+  EXPECT_EQ(calibrator.Add(60, Hold(&firmware, 60)), "");
+  EXPECT_EQ(calibrator.size(), 2u);
+}
+
 struct Errors {
   double rms_deg = 0;
   double lag_ms = 0;
