@@ -110,7 +110,7 @@ std::optional<Options> Parse(const std::vector<std::string>& words, std::ostream
   }
   const int tool = values["tool"].as<int>();
   if (tool < 0 || tool >= kMaxTools) {
-    throw InputError("--tool " + std::to_string(tool) + ": valid: 0 or 1");
+    throw InputError("--tool " + std::to_string(tool) + ": valid: 0 to " + std::to_string(kMaxTools - 1));
   }
   options.tool = static_cast<std::size_t>(tool);
   const config::LinkKind kind = options.cart.handles[options.tool].kind;

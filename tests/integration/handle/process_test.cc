@@ -168,7 +168,7 @@ TEST_F(HandleProcess, CalibrationInTheHandIsStoredAndUsedUnlessRefused) {
     const char* said;
   };
   // One line for each point, and one more for the second try of a refused one.
-  std::array<Case, 10> cases = {{
+  std::array<Case, 11> cases = {{
       {Bridge({"calibrate", "--cart", silent, "--tool", "1"}, "\n"), 1, "refused: no-data: no bytes"},
       {Bridge({"calibrate", "--cart", noisy}, "\n"), 1, "refused: too noisy"},
       {Bridge({"calibrate", "--angles", "10,12"}, "\n\n"), 1, "refused: too few counts apart"},
@@ -177,6 +177,7 @@ TEST_F(HandleProcess, CalibrationInTheHandIsStoredAndUsedUnlessRefused) {
       {Bridge({"calibrate", "--cart", buttons}), 2, "no jaw to measure; valid kinds: serial, simulated"},
       {Bridge({"calibrate", "--cart", operated}), 2, "no jaw to measure; valid kinds: serial, simulated"},
       {Bridge({"calibrate", "--angles", "0,30,60,30"}), 2, "'30' is given twice"},
+      {Bridge({"calibrate", "--tool", "5"}), 2, "--tool 5: valid: 0 to 3"},
       {Bridge({"calibrate", "--angles", "10"}), 2, "valid: 2 to 9"},
       {Bridge({"calibrate", "--help"}), 0, "For each angle, set the jaw to it"},
   }};
