@@ -41,9 +41,9 @@ class TipTracker {
   /// Returns false for a sample that is out of range or off the sheet; it must not be passed to Advance.
   [[nodiscard]] bool Accepts(const CauteryContact& sample) const;
   /// Returns true if the path to this sample has been applied already: a restarted physics node repeats the last tenth
-  /// of a second.
+  /// of a second, and a restarted thermal node receives samples from before its checkpoint, the newest one included.
   [[nodiscard]] bool Repeats(const CauteryContact& sample) const {
-    return sample.session_time_s < last_s_ && sample.session_time_s > last_s_ - kLongestGap_s;
+    return last_s_ >= 0 && sample.session_time_s <= last_s_ && sample.session_time_s > last_s_ - kLongestGap_s;
   }
 
   /// Last sample, for checkpoints: a restarted process continues the path from there. Copied byte by byte.
