@@ -79,7 +79,7 @@ void ThermalNode::Step(const Tick& tick) {
   PublishOpenCells(tick);
   PublishEvents(tick);
   PublishPatch(tick);
-  if (solver_.stepped() || solids_stepped_ || no_setting_) NoteHealth();
+  if (HealthIsOld()) NoteHealth();
 }
 
 void ThermalNode::StepSolids(double dt_s) {
@@ -359,7 +359,17 @@ std::uint64_t ThermalNode::StateHash() const {
   return hash.value();
 }
 
+bool ThermalNode::HealthIsOld() const {
+  // The hook cools on above cold tissue.
+  const bool cooler = ticks_ % kTicksPerClosure == 0 && solver_.figures().hook_C != noted_hook_C_;
+  return solver_.stepped() || solids_stepped_ || no_setting_ != noted_no_setting_ || refused_ != noted_refused_ ||
+         cooler;
+}
+
 void ThermalNode::NoteHealth() {
+  noted_no_setting_ = no_setting_;
+  noted_refused_ = refused_;
+  noted_hook_C_ = solver_.figures().hook_C;
   Figures f{};
   f.solver = solver_.figures();
   f.delivered_J = solver_.ledger().generator;

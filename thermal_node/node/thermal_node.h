@@ -99,6 +99,8 @@ class ThermalNode {
   /// Places of the membrane and of the solids that are due take turns.
   [[nodiscard]] std::optional<NextPatch> ChoosePatch(bool new_reader);
   void PublishManifest(const Tick& tick);
+  /// True if a figure of Health has changed, or may have, since NoteHealth.
+  [[nodiscard]] bool HealthIsOld() const;
   void NoteHealth();
 
   struct Figures {
@@ -137,6 +139,9 @@ class ThermalNode {
   bool waits_ = false, setting_changed_ = false, no_setting_ = false;
   bool restored_ = false, topology_due_ = true, patch_readers_ = false, patch_due_ = false, history_due_ = false,
        patch_note_due_ = false, solids_stepped_ = false, solids_turn_ = false;
+  bool noted_no_setting_ = false;  ///< As in Health, like the next two.
+  std::uint64_t noted_refused_ = 0;
+  float noted_hook_C_ = 0;
   double closure_ = 0;
   bool checkpoint_full_ = false;
   runtime::SeqLock<Figures> figures_;

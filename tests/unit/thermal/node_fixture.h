@@ -51,6 +51,24 @@ class ThermalNodeTest : public ::testing::Test {
     Send(s, tick_.session_time_s);
     Step(node);
   }
+  /// One tick with the tip off the tissue.
+  void Lift(ThermalNode* node) {
+    CauteryContact contact;
+    contact.session_time_s = tick_.session_time_s;
+    contact.stamp = {++sequence_, 1, tick_.stamp_ns};
+    ASSERT_TRUE(bus_.contact_out->Write(contact));
+    Step(node);
+  }
+  /// A figure of Health; NaN: there is none of this name.
+  [[nodiscard]] static double MetricOf(const ThermalNode& node, const std::string& name) {
+    Health health;
+    node.FillHealth(&health);
+    EXPECT_LE(health.metrics.size() + 2, bus::kMaxMetrics) << "the app adds locks_inherited and foreign_samples";
+    for (const Metric& metric : health.metrics) {
+      if (metric.name == name) return metric.value;
+    }
+    return std::nan("");
+  }
   [[nodiscard]] TickManifest NewestManifest() {
     TickManifest manifest;
     EXPECT_TRUE(bus_.manifest_in->TakeLatest(&manifest));

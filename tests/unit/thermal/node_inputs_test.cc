@@ -69,6 +69,28 @@ TEST_F(ThermalNodeTest, WithoutAGeneratorSettingThereIsNoCurrentAndHealthSaysSo)
   Health health;
   node->FillHealth(&health);
   EXPECT_NE(health.last_error.find("GeneratorSetting"), std::string::npos) << health.last_error;
+  // The pedal is up again, and nothing was heated.
+  down.stamp = {2, 1, tick_.stamp_ns};
+  down.pedals = kPedalNone;
+  ASSERT_TRUE(bus_.handle_out->Write(down));
+  for (int n = 0; n < 2; ++n) Touch(node.get(), 0.010f);
+  health = {};
+  node->FillHealth(&health);
+  EXPECT_EQ(health.last_error, "");
+}
+
+TEST_F(ThermalNodeTest, HealthFollowsTheHookThatCoolsAboveColdTissue) {
+  auto node = MakeNode();
+  for (int n = 0; n < 10; ++n) Touch(node.get(), 0.010f);
+  for (int n = 0; n < 3000 && node->solver().stepped(); ++n) Step(node.get());
+  ASSERT_FALSE(node->solver().stepped());
+  const double hook_C = MetricOf(*node, "hook_temperature_C");
+  ASSERT_GT(hook_C, 37.5);
+  for (int n = 0; n < 100; ++n) Step(node.get());
+  // A second of the hook's 16; Health is a tenth of a second old at most.
+  const double now_C = node->solver().figures().hook_C;
+  EXPECT_LT(now_C - 37, 0.95 * (hook_C - 37));
+  EXPECT_NEAR(MetricOf(*node, "hook_temperature_C"), now_C, 0.01 * (hook_C - 37));
 }
 
 TEST_F(ThermalNodeTest, APedalThatFallsSilentIsUp) {
@@ -169,6 +191,15 @@ TEST_F(ThermalNodeTest, ContactOffTheSheetIsRefusedAndCounted) {
   node->FillHealth(&health);
   EXPECT_EQ(health.metrics.back().name, "contacts_refused");
   EXPECT_EQ(health.metrics.back().value, 1);
+}
+
+TEST_F(ThermalNodeTest, RefusedContactsAreCountedWhileNothingIsHeated) {
+  auto node = MakeNode();
+  Touch(node.get(), 0.5f);
+  EXPECT_EQ(MetricOf(*node, "contacts_refused"), 1);
+  Touch(node.get(), 0.5f);
+  EXPECT_EQ(MetricOf(*node, "contacts_refused"), 2);
+  EXPECT_FALSE(node->solver().stepped());
 }
 
 }  // namespace

@@ -39,15 +39,6 @@ class NodeOverSolid : public ThermalNodeTest {
     ASSERT_TRUE(bus_.contact_out->Write(contact));
     Step(node);
   }
-  [[nodiscard]] static double MetricOf(const ThermalNode& node, const std::string& name) {
-    Health health;
-    node.FillHealth(&health);
-    EXPECT_LE(health.metrics.size() + 2, bus::kMaxMetrics) << "the app adds two";
-    for (const Metric& metric : health.metrics) {
-      if (metric.name == name) return metric.value;
-    }
-    return std::nan("");
-  }
 
   SolidChart chart_;
 };

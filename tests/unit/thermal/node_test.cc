@@ -49,15 +49,7 @@ TEST_F(ThermalNodeTest, CutGivesTopologyEventsPatchesAndMetrics) {
   EXPECT_GE(patch.header.topology_revision + 1, cut->revision) << "frames that commit send no patch";
   EXPECT_EQ(patch.texels[4 * (102 * kPatchTexels + 150) + 3], 0);
 
-  Health health;
-  node->FillHealth(&health);
-  EXPECT_LE(health.metrics.size() + 2, bus::kMaxMetrics) << "the app adds locks_inherited and foreign_samples";
-  const auto metric = [&](const std::string& name) {
-    for (const Metric& m : health.metrics) {
-      if (m.name == name) return m.value;
-    }
-    return std::nan("");
-  };
+  const auto metric = [&](const std::string& name) { return MetricOf(*node, name); };
   EXPECT_NEAR(metric("highest_temperature_C"), 100, 10);
   EXPECT_NEAR(metric("cut_length_mm"), 10, 1);
   EXPECT_EQ(metric("burn_depth_mm"), 0);
