@@ -75,6 +75,9 @@ bool SolidSurface::Step(std::span<const TipInput> tips, float dt_s, Interface* h
     set_power_W_ = tips.back().active ? tips.back().power_W : 0.0f;
     voltage_V_ = tips.back().active ? source_.stats().voltage_V : 0.0f;
     if (Acts(tips.back(), hook->hook_theta)) place_ = tips.back().path.to;
+    silent_s_ = 0;
+  } else if ((silent_s_ += dt_s) > kSilent_s) {
+    power_W_ = set_power_W_ = voltage_V_ = 0;
   }
   shortened_ += source_.stats().shortened ? 1 : 0;
   highest_C_ = std::max(highest_C_, material_.body_C + field_.MaxTheta());

@@ -129,6 +129,7 @@ class SolidSurface {
   std::uint32_t warned_ = 0;  ///< Bit of each solid; kMaxSolids bits.
   std::uint64_t frame_ = 0;   ///< Frames in which something was computed.
   float power_W_ = 0, set_power_W_ = 0, voltage_V_ = 0, highest_C_ = 0, left_out_ = 0;
+  float silent_s_ = 0;  ///< Time since the last sample [s].
   std::uint32_t shortened_ = 0;
   Vec2f place_ = Vec2f::Zero();  ///< Of the last sample that heated [m].
   BySolid dead_m2_{}, reported_m2_{};

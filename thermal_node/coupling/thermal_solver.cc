@@ -64,7 +64,7 @@ void ThermalSolver::Step(std::span<const TipInput> tips, float dt_s) {
   figures_.hook_C = field_.material().body_C + source_.interface().hook_theta;
   if (!stepped_) {
     memory_.energised = 0;
-    figures_.power_W = figures_.set_power_W = 0;
+    figures_.power_W = figures_.set_power_W = figures_.voltage_V = 0;
     return;
   }
   ++frame_;
@@ -78,6 +78,9 @@ void ThermalSolver::Step(std::span<const TipInput> tips, float dt_s) {
     figures_.power_W = static_cast<float>((ledger_.generator - before_J) / static_cast<double>(time_s));
     figures_.set_power_W = tips.back().active ? tips.back().power_W : 0.0f;
     last_tip_ = tips.back();
+    silent_s_ = 0;
+  } else if ((silent_s_ += dt_s) > kSilent_s) {
+    figures_.power_W = figures_.set_power_W = figures_.voltage_V = 0;
   }
   figures_.present_C = field_.material().body_C + field_.MaxTheta();
   figures_.highest_C = std::max(figures_.highest_C, figures_.present_C);

@@ -47,7 +47,7 @@ struct SolverEvent {
 struct SolverFigures {
   float highest_C = 0;  ///< Since the start.
   float present_C = 0;
-  float power_W = 0;      ///< Power that the generator delivers, mean over the time of the last samples.
+  float power_W = 0;      ///< Power that the generator delivers, mean over the time of the last samples; 0 without any.
   float set_power_W = 0;  ///< Power that is set at the generator; 0 while it is not active.
   float hook_C = 0;       ///< Temperature of the metal.
   float debris_m2 = 0;    ///< Area of the crumbs that were removed.
@@ -169,6 +169,7 @@ class ThermalSolver {
   float clock_s_ = 0;
   float cut_length_m_ = 0;  ///< Published length [m].
   float protected_dt_s_ = 0;
+  float silent_s_ = 0;  ///< Time since the last sample [s].
   bool committed_ = false, stepped_ = false;
 };
 

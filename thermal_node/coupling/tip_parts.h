@@ -11,6 +11,9 @@ namespace fulcrum::thermal {
 /// Below this excess temperature the metal's heat exchange with tissue is neglected [K].
 inline constexpr float kHookWarm = 2.0f;
 
+/// Time without samples after which the figures of the generator are 0 [s]: ten missed samples of physics_node.
+inline constexpr float kSilent_s = 0.1f;
+
 [[nodiscard]] inline float DurationOf(const TipInput& tip, float dt_s) {
   return tip.duration_s > 0.0f ? tip.duration_s : dt_s;
 }

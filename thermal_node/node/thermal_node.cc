@@ -84,11 +84,9 @@ void ThermalNode::Step(const Tick& tick) {
 
 void ThermalNode::StepSolids(double dt_s) {
   if (solids_ == nullptr) return;
-  const bool before = solids_stepped_;
   Interface hook = solver_.source()->interface();
   solids_stepped_ = solids_->Step(solid_tips_, static_cast<float>(dt_s), &hook);
   if (solids_stepped_) solver_.source()->SetInterface(hook);
-  if (before && !solids_stepped_) NoteHealth();  // Once more, with the power 0.
 }
 
 void ThermalNode::TakeGeneratorInputs(const Tick& tick) {
@@ -362,11 +360,13 @@ std::uint64_t ThermalNode::StateHash() const {
 bool ThermalNode::HealthIsOld() const {
   // The hook cools on above cold tissue.
   const bool cooler = ticks_ % kTicksPerClosure == 0 && solver_.figures().hook_C != noted_hook_C_;
-  return solver_.stepped() || solids_stepped_ || no_setting_ != noted_no_setting_ || refused_ != noted_refused_ ||
-         cooler;
+  // Once more after the last step, with the power 0.
+  return solver_.stepped() || solids_stepped_ || noted_step_ || no_setting_ != noted_no_setting_ ||
+         refused_ != noted_refused_ || cooler;
 }
 
 void ThermalNode::NoteHealth() {
+  noted_step_ = solver_.stepped() || solids_stepped_;
   noted_no_setting_ = no_setting_;
   noted_refused_ = refused_;
   noted_hook_C_ = solver_.figures().hook_C;

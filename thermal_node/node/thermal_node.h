@@ -139,7 +139,7 @@ class ThermalNode {
   bool waits_ = false, setting_changed_ = false, no_setting_ = false;
   bool restored_ = false, topology_due_ = true, patch_readers_ = false, patch_due_ = false, history_due_ = false,
        patch_note_due_ = false, solids_stepped_ = false, solids_turn_ = false;
-  bool noted_no_setting_ = false;  ///< As in Health, like the next two.
+  bool noted_step_ = false, noted_no_setting_ = false;  ///< As of NoteHealth, like the next two.
   std::uint64_t noted_refused_ = 0;
   float noted_hook_C_ = 0;
   double closure_ = 0;

@@ -79,6 +79,21 @@ TEST_F(ThermalNodeTest, WithoutAGeneratorSettingThereIsNoCurrentAndHealthSaysSo)
   EXPECT_EQ(health.last_error, "");
 }
 
+TEST_F(ThermalNodeTest, HealthShowsNoPowerWhileNoContactsCome) {
+  auto node = MakeNode();
+  for (int n = 0; n < 10; ++n) Touch(node.get(), 0.010f);
+  EXPECT_GT(MetricOf(*node, "power_W"), 0);
+  EXPECT_EQ(MetricOf(*node, "set_power_W"), 35);
+  EXPECT_GT(MetricOf(*node, "voltage_V"), 10);
+  (void)node->TakeSettingChanged();
+  for (int n = 0; n < 5; ++n) Step(node.get());
+  EXPECT_EQ(MetricOf(*node, "set_power_W"), 35) << "a gap of 50 ms between two contacts";
+  for (int n = 0; n < 10; ++n) Step(node.get());
+  ASSERT_TRUE(node->solver().stepped()) << "the tissue is still warm";
+  for (const char* name : {"power_W", "set_power_W", "voltage_V"}) EXPECT_EQ(MetricOf(*node, name), 0) << name;
+  EXPECT_TRUE(node->TakeSettingChanged());
+}
+
 TEST_F(ThermalNodeTest, HealthFollowsTheHookThatCoolsAboveColdTissue) {
   auto node = MakeNode();
   for (int n = 0; n < 10; ++n) Touch(node.get(), 0.010f);

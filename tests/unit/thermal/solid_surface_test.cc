@@ -119,6 +119,19 @@ TEST_F(SolidSurfaceTest, CoagulationBlanchesMillimetresAndOpensNothing) {
   EXPECT_LE(solids.power_W(), 30.1f);
 }
 
+TEST_F(SolidSurfaceTest, TheGeneratorsFiguresEndWithTheSamples) {
+  SolidSurface solids(scene_);
+  const TipInput tip = At({0.012f, 0.01f, 0}, CauteryMode::kCoag, 30);
+  for (int frame = 0; frame < 10; ++frame) ASSERT_TRUE(solids.Step(std::span(&tip, 1), kDt, &hook_));
+  ASSERT_GT(solids.power_W(), 1.0f);
+  for (int frame = 0; frame < 5; ++frame) ASSERT_TRUE(solids.Step({}, kDt, &hook_));
+  EXPECT_EQ(solids.set_power_W(), 30.0f) << "a gap of 50 ms between two samples";
+  for (int frame = 0; frame < 10; ++frame) ASSERT_TRUE(solids.Step({}, kDt, &hook_)) << "still warm";
+  EXPECT_EQ(solids.power_W(), 0.0f);
+  EXPECT_EQ(solids.set_power_W(), 0.0f);
+  EXPECT_EQ(solids.voltage_V(), 0.0f);
+}
+
 TEST_F(SolidSurfaceTest, CutLeavesAPitAsWideAsTheMetal) {
   SolidSurface solids(scene_);
   const Vec3f step(4e-3f * kDt, 0, 0);
