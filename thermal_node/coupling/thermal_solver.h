@@ -91,6 +91,8 @@ class ThermalSolver {
   [[nodiscard]] const SolverFigures& figures() const { return figures_; }
   [[nodiscard]] const ProtectedStructures& protected_structures() const { return protected_; }
   [[nodiscard]] const SourceStats& source_stats() const { return source_.stats(); }
+  /// Film of steam at the metal, and the metal's temperature.
+  [[nodiscard]] const Interface& metal() const { return source_.interface(); }
   /// Length of the slit's centre line [m]; it follows the meter's value at most at kLengthRate_m_s.
   [[nodiscard]] float cut_length_m() const { return cut_length_m_; }
   /// Source window, writable: benchmarks vary its parameters.

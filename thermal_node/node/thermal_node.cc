@@ -8,6 +8,7 @@
 
 #include "services/base/core/hash.h"
 #include "services/base/runtime/realtime.h"
+#include "thermal_node/coupling/tip_parts.h"
 
 namespace fulcrum::thermal {
 namespace {
@@ -70,6 +71,7 @@ void ThermalNode::Step(const Tick& tick) {
   TakeTears();
   solver_.Step(tips_, static_cast<float>(tick.dt_s));
   StepSolids(tick.dt_s);
+  CollapseFilm(tick.dt_s);
   // The manifest is published before the checkpoint is written: so a recording has the manifest of every tick that a
   // checkpoint can hold, and a replay derives from the first state hash after a restart whether the last tick was in
   // the checkpoint.
@@ -87,6 +89,16 @@ void ThermalNode::StepSolids(double dt_s) {
   Interface hook = solver_.source()->interface();
   solids_stepped_ = solids_->Step(solid_tips_, static_cast<float>(dt_s), &hook);
   if (solids_stepped_) solver_.source()->SetInterface(hook);
+}
+
+/// Tissue that is heated forms and holds the film (SourceWindow::Run); elsewhere nothing boils.
+void ThermalNode::CollapseFilm(double dt_s) {
+  Interface hook = solver_.metal();
+  if (hook.film == 0.0f || tips_.empty()) return;
+  const auto acts = [&](const TipInput& tip) { return Acts(tip, hook.hook_theta); };
+  if (std::ranges::any_of(tips_, acts) || std::ranges::any_of(solid_tips_, acts)) return;
+  hook.Follow(0.0f, false, Duration(tips_, static_cast<float>(dt_s)));
+  solver_.source()->SetInterface(hook);
 }
 
 void ThermalNode::TakeGeneratorInputs(const Tick& tick) {

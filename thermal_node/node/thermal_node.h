@@ -78,6 +78,8 @@ class ThermalNode {
   [[nodiscard]] bool Accepts(const CauteryContact& sample) const;
   [[nodiscard]] TipInput AdvanceOnSolids(const CauteryContact& sample, const GeneratorDemand& demand, double dt_s);
   void StepSolids(double dt_s);
+  /// Lets the film of steam collapse for the duration of samples that heat nothing.
+  void CollapseFilm(double dt_s);
   [[nodiscard]] std::uint64_t StateHash() const;
   [[nodiscard]] std::optional<ThermalEventKind> InjuryOf(Index solid) const;
   /// The warning before that injury.

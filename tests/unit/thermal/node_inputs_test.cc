@@ -108,6 +108,17 @@ TEST_F(ThermalNodeTest, HealthFollowsTheHookThatCoolsAboveColdTissue) {
   EXPECT_NEAR(MetricOf(*node, "hook_temperature_C"), now_C, 0.01 * (hook_C - 37));
 }
 
+TEST_F(ThermalNodeTest, TheFilmOfSteamCollapsesWhereTheMetalLeavesTheTissue) {
+  auto node = MakeNode();
+  Cut(node.get(), 0.010f, 0.012f);
+  ASSERT_GT(node->solver().metal().film, 0.5f);
+  for (int n = 0; n < 3; ++n) Lift(node.get());
+  EXPECT_LT(node->solver().metal().film, 0.01f) << "exp(-6) after 30 ms";
+  EXPECT_EQ(node->solver().metal().burning, 1.0f);
+  for (int n = 0; n < 97; ++n) Lift(node.get());
+  EXPECT_EQ(node->solver().metal().film, 0.0f);
+}
+
 TEST_F(ThermalNodeTest, APedalThatFallsSilentIsUp) {
   auto node = MakeNode();
   Touch(node.get(), 0.010f);
