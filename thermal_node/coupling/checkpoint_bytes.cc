@@ -3,6 +3,9 @@
 namespace fulcrum::thermal {
 namespace {
 
+/// Bits of a tile's record: awake, and held awake. A tile that is held is awake.
+constexpr std::uint32_t kAwake = 1, kHeld = 2;
+
 /// Accepts only values that the solver can have written into a tile.
 bool Plausible(const TileState& s, int index, const HeatField& field) {
   if (!AllWithin(s.water, 0.0f, 1.0f) || !AllWithin(s.omega_cell, 0.0f, kOmegaMax) ||
@@ -33,7 +36,8 @@ void PutTiles(const HeatField& field, Writer* writer) {
     const TileState& s = tile->state;
     if (IsBlank(s)) continue;
     const auto arrays = FloatArrays(s);
-    std::array<std::uint32_t, 4> record{static_cast<std::uint32_t>(tile->index), 0, s.awake, s.tented};
+    const std::uint32_t wakefulness = s.awake | (tile->held ? kHeld : 0u);
+    std::array<std::uint32_t, 4> record{static_cast<std::uint32_t>(tile->index), 0, wakefulness, s.tented};
     for (std::size_t a = 0; a < arrays.size(); ++a) {
       const float usual = DefaultOf(a);
       const bool worth = std::any_of(arrays[a]->begin(), arrays[a]->end(), [&](float v) { return v != usual; });
@@ -52,8 +56,8 @@ bool GetTiles(Reader* reader, std::uint32_t count, HeatField* field) {
   std::int64_t last = -1;
   for (std::uint32_t n = 0; n < count; ++n) {
     std::array<std::uint32_t, 4> record;
-    bool good = reader->GetValue(&record) && record[0] > last && record[2] <= 1 && record[3] <= 1 &&
-                record[0] < static_cast<std::uint32_t>(field->sheet().tile_count());
+    bool good = reader->GetValue(&record) && record[0] > last && record[2] <= (kAwake | kHeld) && record[2] != kHeld &&
+                record[3] <= 1 && record[0] < static_cast<std::uint32_t>(field->sheet().tile_count());
     last = record[0];
     const auto arrays = FloatArrays(state);
     for (std::size_t a = 0; good && a < arrays.size(); ++a) {
@@ -66,9 +70,9 @@ bool GetTiles(Reader* reader, std::uint32_t count, HeatField* field) {
       field->Clear();
       return false;
     }
-    state.awake = static_cast<std::uint8_t>(record[2]);
+    state.awake = static_cast<std::uint8_t>(record[2] & kAwake);
     state.tented = static_cast<std::uint8_t>(record[3]);
-    field->Restore(static_cast<int>(record[0]), state);
+    field->Restore(static_cast<int>(record[0]), state, (record[2] & kHeld) != 0);
   }
   return true;
 }

@@ -14,8 +14,8 @@ namespace fulcrum::thermal {
 namespace {
 
 /// Identifies the layout; must change with it.
-constexpr std::uint64_t kLayout = 0x7468726d'00000008ull;
-constexpr std::uint64_t kSolidLayout = 0x736f6c69'00000002ull;
+constexpr std::uint64_t kLayout = 0x7468726d'00000009ull;
+constexpr std::uint64_t kSolidLayout = 0x736f6c69'00000003ull;
 /// A checkpoint of one model cannot be restored by another, so the model is part of the layout.
 constexpr std::uint64_t LayoutOf(ThermalModel model) { return kLayout + (static_cast<std::uint64_t>(model) << 16); }
 /// Bytes for tiles: about 1100 with all their arrays, enough for half a metre of cut; a checkpoint that needs

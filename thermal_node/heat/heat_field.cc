@@ -291,10 +291,11 @@ void HeatField::Clear() {
   quarantined_ = 0;
 }
 
-void HeatField::Restore(int index, const TileState& state) {
+void HeatField::Restore(int index, const TileState& state, bool held) {
   Tile* tile = Create(index);
   tile->state = state;
   tile->state.awake = 0;
+  tile->held = held;
   if (state.awake != 0) Wake(tile->tx, tile->ty);
   Ledger none;  // unused: a checkpoint holds no bad cells
   RefreshTheta(tile, &none);

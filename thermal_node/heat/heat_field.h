@@ -96,8 +96,8 @@ class HeatField {
   /// All tiles that exist, by ascending index.
   [[nodiscard]] std::vector<const Tile*> Existing() const;
   void Clear();
-  /// Restores a tile from a checkpoint.
-  void Restore(int index, const TileState& state);
+  /// Restores a tile from a checkpoint. @param held Tile::held, which a tile may keep from one step to the next.
+  void Restore(int index, const TileState& state, bool held);
   void RestoreQuarantined(std::uint64_t count) { quarantined_ = count; }
 
  private:

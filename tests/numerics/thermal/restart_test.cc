@@ -1,8 +1,11 @@
 // A burn that is interrupted anywhere and continues from its checkpoint ends with equal bits.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -80,6 +83,54 @@ TEST_P(RestartTest, AnyFrameWithNothingStagedGivesTheSameBits) {
 
 INSTANTIATE_TEST_SUITE_P(Burns, RestartTest,
                          ::testing::Values(Burn{CauteryMode::kCut, false}, Burn{CauteryMode::kCoag, true}));
+
+/// A warm column beneath keeps a tile awake that is nearly cold itself, here because its warm cells are cut away. A
+/// tile that falls asleep loses its heat.
+TEST(RestartVolumeTest, AnyFrameGivesTheSameBitsWhereATileIsHeldAwakeFromBeneath) {
+  scene::SceneData data = FlatScene(21, 21, 1e-3f);
+  data.fixed.thermal.volume = 1;
+  const SceneView scene = data.View();
+  // Hot metal in the middle of a tile; the tiles beside it stay cold.
+  TipInput hot;
+  hot.touching = true;
+  hot.path.from = hot.path.to = {0.0112f, 0.0112f};
+  hot.path.radius_m = 5e-4f;
+  constexpr int kFrames = 80, kCutAway = 40;
+  std::vector<std::byte> slot(ThermalSolver::CheckpointCapacity(scene));
+  ThermalSolver whole(scene);
+  whole.source()->SetInterface({0, 1, 300});
+  std::unique_ptr<ThermalSolver> restarted;  // From the checkpoint of the frame before.
+  int held = 0;
+  for (int frame = 0; frame < kFrames; ++frame) {
+    if (frame == kCutAway) {
+      const CellIndex middle = whole.field().sheet().CellOf(hot.path.to);
+      Tile* tile = whole.mutable_field()->Wake(middle.ix / kTile, middle.iy / kTile);
+      double heat = 0;
+      for (int k = 0; k < kTileCells; ++k) {
+        const bool warm = tile->theta[ThetaIndex(k % kTile, k / kTile)] > 0.5f * kSleepTheta;
+        if (warm) whole.mutable_field()->TakeOut(tile, k, kRemoved, &heat);
+      }
+      restarted.reset();
+    }
+    const TipInput tip = frame < kCutAway ? hot : TipInput{};
+    whole.Step(tip, kDt);
+    if (restarted != nullptr) {
+      restarted->Step(tip, kDt);
+      ASSERT_EQ(restarted->FullHash(), whole.FullHash()) << "frame " << frame;
+    }
+    const std::vector<const Tile*> tiles = whole.field().Existing();
+    held += std::any_of(tiles.begin(), tiles.end(),
+                        [](const Tile* tile) { return tile->held && tile->theta_max < kSleepTheta; })
+                ? 1
+                : 0;
+    const std::size_t bytes = whole.Save(slot);
+    restarted.reset();
+    if (bytes == 0) continue;
+    restarted = std::make_unique<ThermalSolver>(scene);
+    ASSERT_TRUE(restarted->Restore(std::span(slot).first(bytes)));
+  }
+  EXPECT_GT(held, 10) << "the case occurs";
+}
 
 TEST(RestartRefusalTest, ValuesThatTheSolverCannotHaveWrittenAreRefused) {
   const scene::SceneData data = FlatScene(16, 16, 1e-3f);
