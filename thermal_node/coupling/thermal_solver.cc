@@ -77,7 +77,10 @@ void ThermalSolver::Step(std::span<const TipInput> tips, float dt_s) {
     const float time_s = Duration(tips, dt_s);
     figures_.power_W = static_cast<float>((ledger_.generator - before_J) / static_cast<double>(time_s));
     figures_.set_power_W = tips.back().active ? tips.back().power_W : 0.0f;
+    const Vec2f before = last_tip_.path.to;
     last_tip_ = tips.back();
+    // The slit that the metal has left may still become longer.
+    if (!last_tip_.active && !last_tip_.touching) last_tip_.path.to = before;
     silent_s_ = 0;
   } else if ((silent_s_ += dt_s) > kSilent_s) {
     figures_.power_W = figures_.set_power_W = figures_.voltage_V = 0;

@@ -164,7 +164,7 @@ class ThermalSolver {
   Ledger ledger_;
   SolverFigures figures_;
   EventMemory memory_;
-  TipInput last_tip_;  ///< Newest sample; events refer to its place.
+  TipInput last_tip_;  ///< Newest sample, at the place of the last contact: that of events.
   std::vector<SolverEvent> events_;
   std::vector<ProtectedAlarm> alarms_;
   std::uint64_t frame_ = 0;

@@ -59,6 +59,23 @@ TEST_F(ThermalNodeTest, CutGivesTopologyEventsPatchesAndMetrics) {
   EXPECT_LT(metric("energy_closure"), 1e-4);
 }
 
+TEST_F(ThermalNodeTest, ACutThatIsReportedAfterTheMetalHasLeftHasItsPlace) {
+  auto node = MakeNode();
+  // Faster than the published length follows.
+  for (float s = 0.010f; s < 0.016f; s += 1.4e-4f) Touch(node.get(), s);
+  ThermalEvent event;
+  while (bus_.event_in->TakeNext(&event)) {
+  }
+  for (int n = 0; n < 60; ++n) Lift(node.get());
+  int cuts = 0;
+  while (bus_.event_in->TakeNext(&event)) {
+    if (event.kind != ThermalEventKind::kCut) continue;
+    ++cuts;
+    EXPECT_LT((event.material - Vec2f(0.016f, 0.0102f)).norm(), 1e-3f);
+  }
+  EXPECT_GT(cuts, 0);
+}
+
 TEST_F(ThermalNodeTest, RestartGoesOnWithTheSameTopologyAndHeat) {
   OpenCheckpoint();
   auto node = MakeNode();
