@@ -14,7 +14,7 @@ namespace fulcrum::thermal {
 namespace {
 
 /// Identifies the layout; must change with it.
-constexpr std::uint64_t kLayout = 0x7468726d'00000009ull;
+constexpr std::uint64_t kLayout = 0x7468726d'0000000aull;
 constexpr std::uint64_t kSolidLayout = 0x736f6c69'00000003ull;
 /// A checkpoint of one model cannot be restored by another, so the model is part of the layout.
 constexpr std::uint64_t LayoutOf(ThermalModel model) { return kLayout + (static_cast<std::uint64_t>(model) << 16); }
@@ -125,9 +125,10 @@ struct ThermalSolver::Header {
   EventMemory memory;
   RemovedBox removed;
   ToolPath::End path_end;
+  std::array<float, 2> last_at;  ///< Of the newest sample [m].
   float measured_length_m, cut_length_m, clock_s, protected_dt_s;
   std::uint32_t tile_count, line_count, path_count, sample_count, structure_count;
-  std::uint32_t node_bytes, edge_bytes, shrink_bytes, protected_warm, has_volume;
+  std::uint32_t node_bytes, edge_bytes, shrink_bytes, protected_warm, has_volume, last_active, spare;
 
   [[nodiscard]] bool Finite() const {
     float sum = clock_s + protected_dt_s + memory.reported_cut_m;
@@ -165,6 +166,8 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   header.ledger = ledger_;
   header.figures = figures_;
   header.memory = memory_;
+  header.last_at = {last_tip_.path.to.x(), last_tip_.path.to.y()};
+  header.last_active = last_tip_.active ? 1 : 0;
   header.clock_s = clock_s_;
   header.protected_dt_s = protected_dt_s_;
   header.tile_count = StoredTiles(field_);
@@ -213,7 +216,10 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
       !reader.GetValue(&window)) {
     return false;
   }
-  if (!IsPlausible(window)) return false;
+  // Without contact so far the place is 0.
+  const Vec2f last_at(header.last_at[0], header.last_at[1]);
+  const bool at_rest = header.last_active == 0 && last_at == Vec2f::Zero();
+  if (!IsPlausible(window) || header.last_active > 1 || !(at_rest || field_.sheet().OnSheet(last_at))) return false;
   CellIndex paper_corner;
   std::vector<float> paper_potential(paper_ != nullptr ? paper_->potential().size() : 0);
   if (paper_ != nullptr && (!reader.GetValue(&paper_corner) || !reader.Get(std::span(paper_potential)))) return false;
@@ -259,6 +265,9 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   figures_ = header.figures;
   crumbs_.Restore(figures_.debris_m2);
   memory_ = header.memory;
+  last_tip_ = {};
+  last_tip_.active = header.last_active != 0;
+  last_tip_.path.to = last_at;
   cut_length_m_ = header.cut_length_m;
   clock_s_ = header.clock_s;
   protected_dt_s_ = header.protected_dt_s;

@@ -33,7 +33,7 @@ inline constexpr std::uint64_t kTicksPerHistoryPatch = 100;
 /// A checkpoint is written at each new revision, and every this many frames of the solver while tissue is warm.
 inline constexpr std::uint64_t kFramesPerCheckpoint = 10;
 /// Version of the checkpoint's layout; must change with it.
-inline constexpr std::uint32_t kCheckpointLayout = 9;
+inline constexpr std::uint32_t kCheckpointLayout = 10;
 
 class ThermalNode {
  public:

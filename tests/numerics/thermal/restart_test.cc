@@ -132,6 +132,37 @@ TEST(RestartVolumeTest, AnyFrameGivesTheSameBitsWhereATileIsHeldAwakeFromBeneath
   EXPECT_GT(held, 10) << "the case occurs";
 }
 
+TEST(RestartEventTest, AStrokeThatGoesOnIsReportedOnce) {
+  const scene::SceneData data = FlatScene(16, 16, 1e-3f);
+  const SceneView scene = data.View();
+  Drag drag;
+  drag.from = {0.0053f, 0.0051f};
+  drag.to = {0.0113f, 0.0051f};
+  drag.speed_m_s = 0.006f;
+  std::vector<std::byte> slot(ThermalSolver::CheckpointCapacity(scene));
+  ThermalSolver whole(scene), restarted(scene);
+  for (int frame = 0; frame < 50; ++frame) whole.Step(drag.At(frame, kDt), kDt);
+  const std::size_t bytes = whole.Save(slot);
+  ASSERT_GT(bytes, 0u);
+  ASSERT_TRUE(restarted.Restore(std::span(slot).first(bytes)));
+  for (int frame = 50; frame < 80; ++frame) {
+    // No sample has arrived in the first frames; later the hook has gone.
+    const std::span<const TipInput> none;
+    const TipInput tip = drag.At(frame, kDt), lifted;
+    const auto tips = frame < 52 ? none : std::span(frame < 70 ? &tip : &lifted, 1);
+    whole.Step(tips, kDt);
+    restarted.Step(tips, kDt);
+    ASSERT_EQ(restarted.events().size(), whole.events().size()) << "frame " << frame;
+    for (std::size_t i = 0; i < whole.events().size(); ++i) {
+      const SolverEvent &a = whole.events()[i], &b = restarted.events()[i];
+      EXPECT_EQ(a.kind, b.kind);
+      EXPECT_EQ(a.material, b.material);
+      EXPECT_NE(a.kind, ThermalEventKind::kContact) << "frame " << frame;
+      EXPECT_LT(std::abs(a.material.y() - drag.to.y()), 1e-3f) << "frame " << frame;
+    }
+  }
+}
+
 TEST(RestartRefusalTest, ValuesThatTheSolverCannotHaveWrittenAreRefused) {
   const scene::SceneData data = FlatScene(16, 16, 1e-3f);
   const SceneView scene = data.View();
