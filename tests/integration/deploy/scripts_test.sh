@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# The deploy scripts in a copy of the tree that has stand-ins for packages, builds and programs: what they delete, how
+# they pass on paths, and that nothing run is no success. Usage: scripts_test.sh SOURCE_FOLDER
+set -uo pipefail
+source=$1
+root=$(mktemp -d)
+trap 'rm -rf "$root"' EXIT
+tree=$root/tree
+mkdir -p "$tree/deploy/docs" "$tree/build/release/bin" "$tree/build/fuzz/bin" "$root/tools" "$root/caller"
+cp "$source"/deploy/{run,test,fuzz} "$tree/deploy/"
+cp "$source/deploy/docs/build" "$tree/deploy/docs/"
+cat >"$tree/deploy/lib.sh" <<TEXT
+fulcrum_root=$tree
+fulcrum_build=$tree/build/release
+fulcrum_fail() { echo "\$1" >&2; exit "\${2:-1}"; }
+fulcrum_packages() { :; }
+fulcrum_step() { :; }
+# Fails where the documentation would be built next.
+fulcrum_set_up() { cd "\$fulcrum_root"; [[ \${0##*/} != build ]] || exit 7; }
+TEXT
+failed=0
+expect() { # expect WHAT WANTED GOT
+  [[ $2 == "$3" ]] || { printf 'FAILED: %s\n  wanted: %s\n  got:    %s\n' "$1" "$2" "$3"; failed=1; }
+}
+status() { "$@" >"$root/output" 2>&1; echo $?; }
+
+docs=$tree/deploy/docs/build
+mkdir "$root/full" "$root/empty" "$root/earlier"
+touch "$root/full/thesis" "$root/earlier/.fulcrum-docs" "$root/earlier/index.html" "$root/file"
+expect 'docs: a folder with other files is refused' 2 "$(status "$docs" --out "$root/full")"
+expect 'docs: and kept' thesis "$(ls "$root/full")"
+expect 'docs: a file is refused' 2 "$(status "$docs" --out "$root/file")"
+for good in "$root/empty" "$root/new" "$root/earlier" "$tree/build/docs"; do
+  expect "docs: $good is taken" 7 "$(status "$docs" --out "$good")"
+done
+mkdir "$tree/build/docs"
+touch "$tree/build/docs/index.html"
+expect 'docs: the default folder is taken without a mark' 7 "$(status "$docs" --out "$tree/build/docs")"
+
+((failed == 0)) && echo 'all as it should be'
+exit "$failed"
