@@ -37,5 +37,10 @@ mkdir "$tree/build/docs"
 touch "$tree/build/docs/index.html"
 expect 'docs: the default folder is taken without a mark' 7 "$(status "$docs" --out "$tree/build/docs")"
 
+echo 'add_test(works true)' >"$tree/build/release/CTestTestfile.cmake"
+expect 'test: a test that passes' 0 "$(status "$tree/deploy/test" -R works)"
+expect 'test: a list of tests' 0 "$(status "$tree/deploy/test" -N)"
+[[ $(status "$tree/deploy/test" -R nothing) != 0 ]] || expect 'test: no test is no success' 'a failure' 'success'
+
 ((failed == 0)) && echo 'all as it should be'
 exit "$failed"
