@@ -42,5 +42,14 @@ expect 'test: a test that passes' 0 "$(status "$tree/deploy/test" -R works)"
 expect 'test: a list of tests' 0 "$(status "$tree/deploy/test" -N)"
 [[ $(status "$tree/deploy/test" -R nothing) != 0 ]] || expect 'test: no test is no success' 'a failure' 'success'
 
+printf '#!/bin/sh\nprintf "fuzz_%%s: phony\\n" good absent broken\n' >"$root/tools/ninja"
+printf '#!/bin/sh\n[ "$1" = --seeds ] || printf "Done 5 runs\\nstat::number_of_executed_units: 5\\nfuzz: inputs 5 accepted 5\\n"\n' >"$tree/build/fuzz/bin/fuzz_good"
+printf '#!/bin/sh\nexit 1\n' >"$tree/build/fuzz/bin/fuzz_broken"
+chmod +x "$root/tools/ninja" "$tree"/build/fuzz/bin/*
+touch "$tree/build/fuzz/build.ninja"
+expect 'fuzz: a target that runs' 0 "$(PATH=$root/tools:$PATH status "$tree/deploy/fuzz" --target good --runs 5)"
+expect 'fuzz: targets that do not run have failed' 1 "$(PATH=$root/tools:$PATH status "$tree/deploy/fuzz" --runs 5)"
+expect 'fuzz: and are named' 'failed: absent broken; see the ends of out/fuzz/NAME.log and out/fuzz/crashes' "$(tail -n 1 "$root/output")"
+
 ((failed == 0)) && echo 'all as it should be'
 exit "$failed"
