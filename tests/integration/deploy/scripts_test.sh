@@ -3,7 +3,7 @@
 # they pass on paths, and that nothing run is no success. Usage: scripts_test.sh SOURCE_FOLDER
 set -uo pipefail
 source=$1
-root=$(mktemp -d)
+root=$(realpath "$(mktemp -d)")
 trap 'rm -rf "$root"' EXIT
 tree=$root/tree
 mkdir -p "$tree/deploy/docs" "$tree/build/release/bin" "$tree/build/fuzz/bin" "$root/tools" "$root/caller"
@@ -50,6 +50,13 @@ touch "$tree/build/fuzz/build.ninja"
 expect 'fuzz: a target that runs' 0 "$(PATH=$root/tools:$PATH status "$tree/deploy/fuzz" --target good --runs 5)"
 expect 'fuzz: targets that do not run have failed' 1 "$(PATH=$root/tools:$PATH status "$tree/deploy/fuzz" --runs 5)"
 expect 'fuzz: and are named' 'failed: absent broken; see the ends of out/fuzz/NAME.log and out/fuzz/crashes' "$(tail -n 1 "$root/output")"
+
+printf '#!/bin/sh\necho "$@"\n' >"$tree/build/release/bin/fulcrum"
+chmod +x "$tree/build/release/bin/fulcrum"
+paths=$(cd "$root/caller" && "$tree/deploy/run" --database d --database=d --keys k --keys=k --cart c --data=m --record-to r --out o)
+expect 'run: paths are those of the caller' \
+  "up built-in --out $root/caller/o --record --database $root/caller/d --database $root/caller/d --keys $root/caller/k \
+--keys $root/caller/k --cart $root/caller/c --data $root/caller/m --record-to $root/caller/r" "$paths"
 
 ((failed == 0)) && echo 'all as it should be'
 exit "$failed"
