@@ -84,7 +84,8 @@ bool MoveHere(T* message, LinkContext* link) {
 template <class T>
 class OutgoingSamples final : public Outgoing {
  public:
-  explicit OutgoingSamples(std::unique_ptr<bus::Input<T>> input) : input_(std::move(input)) {}
+  OutgoingSamples(std::unique_ptr<bus::Input<T>> input, std::uint32_t number)
+      : input_(std::move(input)), number_(number) {}
 
   std::int64_t Pump(LinkContext* link) override {
     if (std::exchange(repeat_, false)) {
@@ -105,6 +106,7 @@ class OutgoingSamples final : public Outgoing {
     return kNever;
   }
   void Repeat() override { repeat_ = true; }
+  [[nodiscard]] std::uint32_t number() const override { return number_; }
 
  private:
   static constexpr std::size_t kMostWriters = 16;
@@ -137,7 +139,7 @@ class OutgoingSamples final : public Outgoing {
   std::unique_ptr<bus::Input<T>> input_;
   T message_;
   std::map<std::uint64_t, T> newest_;  ///< By epoch: what a late joiner gets.
-  std::uint32_t number_ = 0;
+  std::uint32_t number_;
   std::int64_t due_ns_ = 0;
   bool repeat_ = false;
   std::vector<std::uint8_t> cdr_;
@@ -146,7 +148,8 @@ class OutgoingSamples final : public Outgoing {
 /// Sends the newest state as the difference from the one before.
 class OutgoingTopology final : public Outgoing {
  public:
-  explicit OutgoingTopology(std::unique_ptr<bus::Input<TopologyState>> input) : input_(std::move(input)) {}
+  OutgoingTopology(std::unique_ptr<bus::Input<TopologyState>> input, std::uint32_t number)
+      : input_(std::move(input)), number_(number) {}
 
   std::int64_t Pump(LinkContext* link) override {
     const bool whole = std::exchange(repeat_, false);
@@ -166,12 +169,13 @@ class OutgoingTopology final : public Outgoing {
     return kNever;
   }
   void Repeat() override { repeat_ = true; }
+  [[nodiscard]] std::uint32_t number() const override { return number_; }
 
  private:
   std::unique_ptr<bus::Input<TopologyState>> input_;
   TopologyState state_;
   bool known_ = false, repeat_ = true;
-  std::uint32_t number_ = 0;
+  std::uint32_t number_;
   std::vector<std::uint8_t> cdr_, sent_;
 };
 
@@ -187,7 +191,8 @@ constexpr std::int64_t kTissueAgain_ns = 100'000'000;
 /// Sends the blocks that moved, at the picture rate.
 class OutgoingTissue final : public Outgoing {
  public:
-  explicit OutgoingTissue(std::unique_ptr<bus::Input<TissueFrame>> input) : input_(std::move(input)) {}
+  OutgoingTissue(std::unique_ptr<bus::Input<TissueFrame>> input, std::uint32_t number)
+      : input_(std::move(input)), sender_(number) {}
 
   std::int64_t Pump(LinkContext* link) override {
     if (link->now_ns < due_ns_) return due_ns_;
@@ -208,6 +213,7 @@ class OutgoingTissue final : public Outgoing {
   void Repeat(std::span<const std::uint32_t> chunks) override {
     for (const std::uint32_t chunk : chunks) sender_.Repeat(chunk);
   }
+  [[nodiscard]] std::uint32_t number() const override { return sender_.chunks(); }
 
  private:
   std::unique_ptr<bus::Input<TissueFrame>> input_;
@@ -219,7 +225,8 @@ class OutgoingTissue final : public Outgoing {
 /// Sends the changed tiles of every patch, since each patch has a place of its own in the atlas.
 class OutgoingPatches final : public Outgoing {
  public:
-  explicit OutgoingPatches(std::unique_ptr<bus::Input<TemperaturePatch>> input) : input_(std::move(input)) {}
+  OutgoingPatches(std::unique_ptr<bus::Input<TemperaturePatch>> input, std::uint32_t number)
+      : input_(std::move(input)), sender_(number) {}
 
   std::int64_t Pump(LinkContext* link) override {
     const SendChunk send = ChunkSender(link, PacketKind::kPatch);
@@ -235,6 +242,7 @@ class OutgoingPatches final : public Outgoing {
     for (const std::uint32_t chunk : chunks) sender_.Repeat(chunk);
     repeat_ = true;
   }
+  [[nodiscard]] std::uint32_t number() const override { return sender_.chunks(); }
 
  private:
   std::unique_ptr<bus::Input<TemperaturePatch>> input_;
@@ -353,17 +361,18 @@ class IncomingChunks final : public IncomingBase<T> {
 
 }  // namespace
 
-std::unique_ptr<Outgoing> MakeOutgoing(TopicId topic, bus::DdsParticipant* bus, std::function<void()> notify) {
+std::unique_ptr<Outgoing> MakeOutgoing(TopicId topic, bus::DdsParticipant* bus, std::function<void()> notify,
+                                       std::uint32_t number) {
   return bus::WithMessageOf(topic, [&]<class T>(std::type_identity<T>) -> std::unique_ptr<Outgoing> {
     auto input = bus->MakeInput<T>(std::move(notify));
     if constexpr (std::is_same_v<T, TissueFrame>) {
-      return std::make_unique<OutgoingTissue>(std::move(input));
+      return std::make_unique<OutgoingTissue>(std::move(input), number);
     } else if constexpr (std::is_same_v<T, TemperaturePatch>) {
-      return std::make_unique<OutgoingPatches>(std::move(input));
+      return std::make_unique<OutgoingPatches>(std::move(input), number);
     } else if constexpr (std::is_same_v<T, TopologyState>) {
-      return std::make_unique<OutgoingTopology>(std::move(input));
+      return std::make_unique<OutgoingTopology>(std::move(input), number);
     } else {
-      return std::make_unique<OutgoingSamples<T>>(std::move(input));
+      return std::make_unique<OutgoingSamples<T>>(std::move(input), number);
     }
   });
 }

@@ -45,6 +45,8 @@ class Outgoing {
   /// Sends again what a late joiner gets, because the other side has lost it.
   virtual void Repeat() {}
   virtual void Repeat(std::span<const std::uint32_t> /*chunks*/) {}
+  /// Number of the last sample or chunk sent: for MakeOutgoing when the topic is wanted again.
+  [[nodiscard]] virtual std::uint32_t number() const = 0;
 };
 
 class Incoming {
@@ -65,8 +67,10 @@ class Incoming {
 };
 
 /// @param notify called on a thread of the bus when a sample has come.
+/// @param number that of the last sample or chunk of this topic that was sent to the present peer; 0: none. Numbers
+/// never begin anew while the link runs, because the other side takes a smaller number for a late packet.
 [[nodiscard]] std::unique_ptr<Outgoing> MakeOutgoing(TopicId topic, bus::DdsParticipant* bus,
-                                                     std::function<void()> notify);
+                                                     std::function<void()> notify, std::uint32_t number);
 [[nodiscard]] std::unique_ptr<Incoming> MakeIncoming(TopicId topic, bus::DdsParticipant* bus);
 
 /// Kind of packet that carries the topic.

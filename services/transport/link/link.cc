@@ -379,11 +379,14 @@ void Link::FollowWishes(std::uint32_t wanted, std::int64_t now) {
       // A new reader on the other host has not received the earlier samples.
       if (channel.out != nullptr && (wished_ & BitOf(topic)) == 0) channel.out->Repeat();
       if (channel.out == nullptr && context_.side.MayLeave(static_cast<TopicId>(topic))) {
-        channel.out = MakeOutgoing(static_cast<TopicId>(topic), local_, [this] { inbox_.Wake(); });
+        channel.out = MakeOutgoing(
+            static_cast<TopicId>(topic), local_, [this] { inbox_.Wake(); }, channel.number);
       }
     } else if (channel.out != nullptr) {
       if (channel.unwanted_since_ns == 0) channel.unwanted_since_ns = now;
-      if (now - channel.unwanted_since_ns > kUnwanted) channel.out.reset();
+      if (now - channel.unwanted_since_ns <= kUnwanted) continue;
+      channel.number = channel.out->number();
+      channel.out.reset();
     }
   }
   wished_ = wanted;

@@ -89,6 +89,7 @@ class Link {
     std::unique_ptr<Outgoing> out;
     std::unique_ptr<Incoming> in;
     std::int64_t unwanted_since_ns = 0;
+    std::uint32_t number = 0;  ///< Of the last sample or chunk of an `out` that was removed.
   };
 
   void Run(const std::stop_token& stop);

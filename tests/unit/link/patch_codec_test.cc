@@ -120,5 +120,21 @@ TEST(PatchCodec, ASlotThatMovesBeginsAnew) {
   EXPECT_EQ(receiver.patch().header.origin_x, 768u);
 }
 
+TEST(PatchCodec, AReplacedSenderContinuesTheNumbers) {
+  PatchReceiver receiver;
+  std::uint32_t chunks = 0;
+  for (std::uint64_t sequence = 1; sequence <= 20; ++sequence) {
+    PatchSender sender(chunks);
+    const TemperaturePatch patch = Spot(0, 10 + static_cast<double>(sequence), sequence);
+    Result last = Result::kBad;
+    for (const Chunk& chunk : Encode(&sender, patch)) last = receiver.Take(chunk);
+    ASSERT_EQ(last, Result::kFrame) << sequence;
+    EXPECT_EQ(receiver.patch().texels, patch.texels);
+    EXPECT_GT(sender.chunks(), chunks);
+    chunks = sender.chunks();
+  }
+  EXPECT_EQ(receiver.missing().lost(), 0u);
+}
+
 }  // namespace
 }  // namespace fulcrum::link

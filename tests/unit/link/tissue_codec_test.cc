@@ -159,5 +159,22 @@ TEST(TissueCodec, TheLargestFrameAndTheFarthestPlacesFit) {
   EXPECT_LE(ErrorOf(receiver.frame(), frame), kTissueError_m);
 }
 
+TEST(TissueCodec, AReplacedSenderContinuesTheNumbers) {
+  TissueReceiver receiver;
+  std::uint32_t chunks = 0;
+  for (std::uint64_t sequence = 1; sequence <= 20; ++sequence) {
+    // Each frame has a sender of its own, and the frames several chunks.
+    TissueSender sender(chunks);
+    const TissueFrame frame = Sheet(60, 80, 0.001 * static_cast<double>(sequence), sequence);
+    TissueReceiver::Result last = TissueReceiver::Result::kBad;
+    for (const Chunk& chunk : Encode(&sender, frame)) last = receiver.Take(chunk);
+    ASSERT_EQ(last, TissueReceiver::Result::kFrame) << sequence;
+    EXPECT_LE(ErrorOf(receiver.frame(), frame), kTissueError_m);
+    EXPECT_GT(sender.chunks(), chunks);
+    chunks = sender.chunks();
+  }
+  EXPECT_EQ(receiver.missing().lost(), 0u);
+}
+
 }  // namespace
 }  // namespace fulcrum::link

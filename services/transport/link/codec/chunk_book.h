@@ -15,7 +15,10 @@ using BlockId = std::uint32_t;
 /// Sender's record of the chunks.
 class SentChunks {
  public:
-  /// Number of the chunk that begins now; the first is 1.
+  /// @param newest number of the last chunk that an earlier sender of this topic sent; 0: none.
+  explicit SentChunks(std::uint32_t newest) : newest_(newest) {}
+  [[nodiscard]] std::uint32_t newest() const { return newest_; }
+  /// Number of the chunk that begins now.
   [[nodiscard]] std::uint32_t Begin() {
     ++newest_;
     Of(newest_).clear();
@@ -33,7 +36,7 @@ class SentChunks {
   static constexpr std::uint32_t kKept = 4096;
   std::vector<BlockId>& Of(std::uint32_t chunk) { return ring_[chunk % kKept]; }
   std::vector<std::vector<BlockId>> ring_{kKept};
-  std::uint32_t newest_ = 0;
+  std::uint32_t newest_;
 };
 
 /// Receiver's record of the chunks.

@@ -17,6 +17,10 @@ inline constexpr std::uint32_t kMostSlots = 16;
 
 class PatchSender {
  public:
+  /// @param chunks `chunks()` of the sender that this one replaces; 0: none. A receiver ignores older numbers.
+  explicit PatchSender(std::uint32_t chunks = 0) : frame_(chunks), sent_(chunks) {}
+  /// Number of the last chunk sent; no frame has a larger number, because each has at least one chunk.
+  [[nodiscard]] std::uint32_t chunks() const { return sent_.newest(); }
   /// Sends in at least one chunk what the receiver needs to reproduce `patch`. A slot beyond kMostSlots is not sent.
   void Encode(const TemperaturePatch& patch, const SendChunk& send);
   /// Marks the tiles of a chunk that did not arrive: they are sent again with the next patch of their slot or by Flush.
@@ -35,7 +39,7 @@ class PatchSender {
   void Emit(Slot* slot, const SendChunk& send);
 
   std::array<Slot, kMostSlots> slots_;
-  std::uint32_t frame_ = 0;
+  std::uint32_t frame_;
   SentChunks sent_;
   std::vector<std::uint8_t> chunk_, block_;
 };

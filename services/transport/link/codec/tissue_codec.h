@@ -32,6 +32,10 @@ using SendChunk = std::function<void(std::span<const std::uint8_t>)>;
 
 class TissueSender {
  public:
+  /// @param chunks `chunks()` of the sender that this one replaces; 0: none. A receiver ignores older numbers.
+  explicit TissueSender(std::uint32_t chunks = 0) : frame_(chunks), sent_(chunks) {}
+  /// Number of the last chunk sent; no frame has a larger number, because each has at least one chunk.
+  [[nodiscard]] std::uint32_t chunks() const { return sent_.newest(); }
   /// Sends in at least one chunk, with the header, what the receiver needs to reproduce `frame`.
   void Encode(const TissueFrame& frame, const SendChunk& send);
   /// Marks the blocks of a chunk that did not arrive: they are sent again with the next frame or by Flush.
@@ -50,7 +54,7 @@ class TissueSender {
   std::vector<std::int32_t> sent_steps_;  ///< Last sent positions, three per vertex [steps].
   std::vector<bool> dirty_;               ///< Per block.
   std::uint32_t next_refresh_ = 0;        ///< Index of a block.
-  std::uint32_t frame_ = 0;
+  std::uint32_t frame_;
   SentChunks sent_;
   std::vector<std::uint8_t> chunk_, block_;
 };
