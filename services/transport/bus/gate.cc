@@ -153,6 +153,7 @@ bool PassesGate(const TemperaturePatch& m) noexcept {
 
 bool PassesGate(const Picture& m) noexcept {
   constexpr std::uint32_t kMaxEdge_px = 16384;
+  constexpr float kMaxScale = 4;            // render::QualityControl::kMostScale.
   constexpr std::size_t kShortestJpeg = 4;  // Its first and its last mark.
   const PictureHeader& h = m.header;
   const auto unit = [](const Vec3f& v) { return Within(v.norm(), 1.0f - kUnitTolerance, 1.0f + kUnitTolerance); };
@@ -160,7 +161,7 @@ bool PassesGate(const Picture& m) noexcept {
          h.height >= 1 && h.height <= kMaxEdge_px && h.size <= kMaxPictureBytes && m.jpeg.size() == h.size &&
          h.size >= kShortestJpeg && m.jpeg[0] == 0xff && m.jpeg[1] == 0xd8 &&
          (h.present | h.scopes) >> kMaxTools == 0 && Magnitude(h.eye_W, kMaxCoordinate_m) && unit(h.right_W) &&
-         unit(h.up_W) && unit(h.forward_W) && Within(h.pixel_rad, 1e-6f, 1.0f) && Within(h.scale, 1e-3f, 1.0f) &&
+         unit(h.up_W) && unit(h.forward_W) && Within(h.pixel_rad, 1e-6f, 1.0f) && Within(h.scale, 1e-3f, kMaxScale) &&
          std::all_of(h.tip_W.begin(), h.tip_W.end(), [](const Vec3f& p) { return Magnitude(p, kMaxCoordinate_m); });
 }
 

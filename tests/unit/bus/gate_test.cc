@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "render_node/geometry/quality.h"
 #include "services/base/core/message_fields.h"
 #include "tests/unit/bus/message_types.h"
 #include "tests/unit/bus/samples.h"
@@ -190,7 +191,11 @@ TEST(GateRanges, Picture) {
                           {"an eye beyond the room", [](auto& m) { m.header.eye_W.z() = 11; }},
                           {"a view of no direction", [](auto& m) { m.header.forward_W.setZero(); }},
                           {"pixels of no size", [](auto& m) { m.header.pixel_rad = 0; }},
-                          {"larger than drawn", [](auto& m) { m.header.scale = 1.5f; }}});
+                          {"larger than drawn", [](auto& m) { m.header.scale = 4.5f; }}});
+  // A fast machine draws more pixels than it shows.
+  Picture smooth = test::Sample<Picture>();
+  smooth.header.scale = render::QualityControl::kMostScale;
+  EXPECT_TRUE(PassesGate(smooth));
 }
 
 TEST(GateRanges, TopologyState) {
