@@ -264,9 +264,8 @@ Finding Scenes() {
           "install the package again, or build from a whole source tree"};
 }
 
-Finding Cart() {
-  const fs::path cart = runtime::MachineCart();
-  if (cart.empty() || !fs::exists(cart)) {
+Finding Cart(const fs::path& cart) {
+  if (cart.empty()) {
     return {true, "no cart file of this machine: without --cart all hardware is simulated", ""};
   }
   try {
@@ -297,7 +296,7 @@ ExitCode Doctor(const Words& words) {
   const std::vector<std::pair<const char*, Finding>> findings{
       {"programs", NodePrograms()},
       {"scenes", Scenes()},
-      {"cart", Cart()},
+      {"cart", Cart(CartOf(arguments))},
       {"shared memory", SharedMemory(domain)},
       {"socket buffers", SocketBuffers()},
       {"domain", DomainInUse(domain)},
