@@ -47,7 +47,8 @@ Arguments Parse(const char* command, const Words& words, const po::options_descr
 void AddDomain(po::options_description* options) {
   options->add_options()(
       "domain", po::value<int>()->value_name("N"),
-      ("DDS domain of the cart, 1 to 100 (default: " + std::to_string(config::DefaultDomain()) + ", of this user)")
+      ("DDS domain of the cart, 1 to 100 (default: that of the cart file, of --cart or the installation's, else " +
+       std::to_string(config::DefaultDomain()) + ", of this user)")
           .c_str());
 }
 
@@ -57,6 +58,13 @@ int DomainOf(const Arguments& arguments, int fallback) {
     throw InputError("--domain " + std::to_string(domain) + ": must be 1 to 100");
   }
   return domain;
+}
+
+int DomainOf(const Arguments& arguments) {
+  // A cart file with a fault must not keep anyone from a session whose domain is given.
+  if (arguments.values.count("domain") != 0) return DomainOf(arguments, 0);
+  const std::filesystem::path cart = CartOf(arguments);
+  return cart.empty() ? config::DefaultDomain() : config::LoadCart(cart).domain;
 }
 
 void AddCart(po::options_description* options) {

@@ -69,6 +69,9 @@ struct Arguments {
 void AddDomain(boost::program_options::options_description* options);
 /// Value of --domain. Throws InputError when it is out of range.
 [[nodiscard]] int DomainOf(const Arguments& arguments, int fallback);
+/// Value of --domain, else that of the cart file (CartOf), else this user's own: the domain in which `fulcrum up` with
+/// the same options runs. Throws InputError when it is out of range or the cart file has a fault.
+[[nodiscard]] int DomainOf(const Arguments& arguments);
 
 /// Adds --cart.
 void AddCart(boost::program_options::options_description* options);

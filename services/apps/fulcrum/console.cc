@@ -5,7 +5,6 @@
 #include <cstdio>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/base/config/cart.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/install_places.h"
 
@@ -56,8 +55,7 @@ ExitCode Console(const Words& words) {
   settings.courses = runtime::ShareFolder() / "courses";
   settings.database = DatabaseOf(arguments);
   settings.programs = runtime::ProgramFolder();
-  settings.domain =
-      DomainOf(arguments, settings.cart.empty() ? config::DefaultDomain() : config::LoadCart(settings.cart).domain);
+  settings.domain = DomainOf(arguments);
   settings.state = UserFolder("XDG_STATE_HOME", ".local/state");
   console::Console console(settings);
   std::fputs(console::Greeting(console.Facts(), ::isatty(STDOUT_FILENO) == 1).c_str(), stdout);

@@ -291,12 +291,14 @@ ExitCode Doctor(const Words& words) {
   if (arguments.help) {
     return ExitCode::kDone;
   }
-  const int domain = DomainOf(arguments, config::DefaultDomain());
+  // A cart file with a fault is one of the findings.
+  const Finding cart = Cart(CartOf(arguments));
+  const int domain = cart.good ? DomainOf(arguments) : DomainOf(arguments, config::DefaultDomain());
   if (arguments.values.count("security") != 0) return ReportSecurity(domain, CartOf(arguments));
   const std::vector<std::pair<const char*, Finding>> findings{
       {"programs", NodePrograms()},
       {"scenes", Scenes()},
-      {"cart", Cart(CartOf(arguments))},
+      {"cart", cart},
       {"shared memory", SharedMemory(domain)},
       {"socket buffers", SocketBuffers()},
       {"domain", DomainInUse(domain)},

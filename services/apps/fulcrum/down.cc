@@ -3,7 +3,6 @@
 #include <thread>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/base/config/cart.h"
 #include "services/session/supervisor/domain_guard.h"
 
 namespace fulcrum::supervisor::cli {
@@ -15,7 +14,7 @@ ExitCode Down(const Words& words) {
   if (arguments.help) {
     return ExitCode::kDone;
   }
-  const int domain = DomainOf(arguments, config::DefaultDomain());
+  const int domain = DomainOf(arguments);
   const ExitCode answer = Ask(domain, "down", "");
   // Waits until the session has ended, so that the next one can start at once.
   constexpr auto kPatience = std::chrono::seconds(30);

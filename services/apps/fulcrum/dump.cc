@@ -1,5 +1,4 @@
 #include "services/apps/fulcrum/commands.h"
-#include "services/base/config/cart.h"
 
 namespace fulcrum::supervisor::cli {
 
@@ -10,7 +9,7 @@ ExitCode Dump(const Words& words) {
   if (arguments.help) {
     return ExitCode::kDone;
   }
-  return Ask(DomainOf(arguments, config::DefaultDomain()), "dump", "requested by fulcrum dump");
+  return Ask(DomainOf(arguments), "dump", "requested by fulcrum dump");
 }
 
 }  // namespace fulcrum::supervisor::cli

@@ -1,5 +1,4 @@
 #include "services/apps/fulcrum/commands.h"
-#include "services/base/config/cart.h"
 #include "services/base/core/error.h"
 #include "services/session/supervisor/outcome.h"
 
@@ -19,7 +18,7 @@ ExitCode Generator(const Words& words) {
     turned.append(turned.empty() ? "" : " ").append(knob).append("=");
     turned.append(Fixed(arguments.values[knob].as<double>(), 2));
   }
-  return Ask(DomainOf(arguments, config::DefaultDomain()), "generator", turned);
+  return Ask(DomainOf(arguments), "generator", turned);
 }
 
 }  // namespace fulcrum::supervisor::cli

@@ -41,7 +41,7 @@ ExitCode Host(const Words& words) {
   }
   const auto text = [&](const char* name) { return values.count(name) != 0 ? values[name].as<std::string>() : ""; };
   HostSettings settings;
-  settings.domain = DomainOf(arguments, config::DefaultDomain());
+  settings.domain = DomainOf(arguments);
   settings.far = link::FarSettingsFor(bus::FarSide::kHost, text("peer"), text("address"), settings.domain,
                                       values.count("link-domain") != 0 ? values["link-domain"].as<int>() : 0);
   if (values.count("nodes") != 0) {

@@ -2,7 +2,6 @@
 #include <ctime>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/base/config/cart.h"
 #include "services/base/core/error.h"
 #include "services/transport/bus/dds/shared_memory.h"
 #include "services/transport/bus/topics.h"
@@ -107,7 +106,7 @@ ExitCode Check(const fs::path& folder) {
 /// The keys that --keys names, or those of the running session.
 bus::Security KeysOf(const Arguments& arguments) {
   if (arguments.values.count("keys") != 0) return {arguments.values["keys"].as<std::string>()};
-  const int domain = DomainOf(arguments, config::DefaultDomain());
+  const int domain = DomainOf(arguments);
   const fs::path memory = bus::SharedMemoryDirectory(domain);
   bus::Security session = bus::AnnouncedSecurity(memory, {});
   if (!session.on()) session.keys = memory / "keys";
@@ -134,7 +133,7 @@ ExitCode Issue(const Arguments& arguments, const std::string& name, int days) {
   // The number of the running session, without which its samples would be dropped. A guest of a lasting folder needs it
   // for each session: issued again, or as the user of the session.
   if (!order.out.empty() && arguments.values.count("keys") == 0) {
-    bus::HandOverSession(bus::SharedMemoryDirectory(DomainOf(arguments, config::DefaultDomain())), order.out);
+    bus::HandOverSession(bus::SharedMemoryDirectory(DomainOf(arguments)), order.out);
   }
   const fs::path folder = fs::absolute(order.out.empty() ? cart.keys : order.out).lexically_normal();
   std::printf(

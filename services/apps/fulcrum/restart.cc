@@ -1,5 +1,4 @@
 #include "services/apps/fulcrum/commands.h"
-#include "services/base/config/cart.h"
 #include "services/base/core/error.h"
 
 namespace fulcrum::supervisor::cli {
@@ -14,7 +13,7 @@ ExitCode Restart(const Words& words) {
   if (arguments.values.count("node") == 0) {
     throw InputError("NODE is missing, for example physics_node; fulcrum status lists the nodes");
   }
-  return Ask(DomainOf(arguments, config::DefaultDomain()), "restart", arguments.values["node"].as<std::string>());
+  return Ask(DomainOf(arguments), "restart", arguments.values["node"].as<std::string>());
 }
 
 }  // namespace fulcrum::supervisor::cli

@@ -44,7 +44,7 @@ ExitCode Soak(const Words& words) {
     throw InputError("--minutes " + Fixed(settings.minutes, 2) + ": must be 0.2 to 10080");
   }
   settings.chaos = values.count("chaos") != 0;
-  settings.domain = DomainOf(arguments, config::DefaultDomain());
+  settings.domain = DomainOf(arguments);
   settings.out = values["out"].as<std::string>();
   settings.program = runtime::ProgramFolder() / "fulcrum";
   if (values.count("record") != 0) settings.up.insert(settings.up.end(), {"--record", "--no-video"});

@@ -3,7 +3,6 @@
 #include <thread>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/base/config/cart.h"
 #include "services/base/core/error.h"
 #include "services/session/supervisor/domain_guard.h"
 #include "services/session/supervisor/session_view.h"
@@ -17,7 +16,7 @@ ExitCode Status(const Words& words) {
   if (arguments.help) {
     return ExitCode::kDone;
   }
-  const int domain = DomainOf(arguments, config::DefaultDomain());
+  const int domain = DomainOf(arguments);
   if (!DomainGuard::IsHeld(domain)) {
     std::printf("no session runs in domain %d\n", domain);
     return ExitCode::kFailure;

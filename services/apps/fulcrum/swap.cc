@@ -1,7 +1,6 @@
 #include <boost/program_options/parsers.hpp>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/base/config/cart.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/install_places.h"
 
@@ -51,7 +50,7 @@ ExitCode Swap(const Words& words) {
     argument += "\ncommand";
     for (const std::string& word : command) argument += "\n" + word;
   }
-  return Ask(DomainOf(arguments, config::DefaultDomain()), "swap", argument);
+  return Ask(DomainOf(arguments), "swap", argument);
 }
 
 }  // namespace fulcrum::supervisor::cli

@@ -5,7 +5,6 @@
 #include <thread>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/base/config/cart.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/realtime.h"
 #include "services/session/supervisor/domain_guard.h"
@@ -20,7 +19,7 @@ ExitCode Top(const Words& words) {
   if (arguments.help) {
     return ExitCode::kDone;
   }
-  const int domain = DomainOf(arguments, config::DefaultDomain());
+  const int domain = DomainOf(arguments);
   if (!DomainGuard::IsHeld(domain)) {
     throw InputError("no session runs in domain " + std::to_string(domain) + "; start one with fulcrum up SCENE");
   }

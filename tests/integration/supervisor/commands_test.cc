@@ -1,11 +1,15 @@
 // Options and output of the command `fulcrum` where no session runs.
 #include <gtest/gtest.h>
+#include <signal.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <filesystem>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "services/session/supervisor/domain_guard.h"
 #include "services/session/supervisor/session_folder.h"
 #include "tests/support/program.h"
 
@@ -42,9 +46,39 @@ class CommandsTest : public ::testing::Test {
   std::string said_;
 };
 
+TEST_F(CommandsTest, WhatServesASessionLooksInTheDomainOfTheMachinesCart) {
+  const fs::path program = folder_ / "libexec" / "fulcrum" / "fulcrum";
+  fs::create_directories(program.parent_path());
+  fs::create_directories(folder_ / "etc" / "fulcrum");
+  fs::copy_file(FULCRUM_BIN_DIR "/fulcrum", program);
+  fs::copy_file(cart_, folder_ / "etc" / "fulcrum" / "cart.yaml");
+  for (Words words : {Words{"status"}, Words{"top"}, Words{"down"}, Words{"dump"}, Words{"restart", "physics_node"},
+                      Words{"swap", "physics_node", "--build", "x"}, Words{"generator", "--cut", "30"},
+                      Words{"keys", "issue", "some_tool", "--read", "Health"}}) {
+    EXPECT_NE(Run(words, program), 0) << words[0];
+    EXPECT_TRUE(Said("domain 80")) << words[0] << ": " << said_;
+    words.insert(words.end(), {"--domain", "81"});
+    EXPECT_NE(Run(words, program), 0) << words[0];
+    EXPECT_TRUE(Said("domain 81")) << words[0] << ": " << said_;
+  }
+}
+
+TEST_F(CommandsTest, AHostWaitsInTheDomainOfItsCartFile) {
+  ASSERT_FALSE(DomainGuard::IsHeld(kDomain));
+  Program host("fulcrum", {"host", "--peer", "127.0.0.1", "--address", "127.0.0.1", "--insecure-link", "--cart",
+                           cart_.string(), "--out", folder_.string()});
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (!DomainGuard::IsHeld(kDomain) && !host.Poll() && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  EXPECT_TRUE(DomainGuard::IsHeld(kDomain)) << host.Said();
+  host.End(SIGTERM);
+}
+
 TEST_F(CommandsTest, TheDoctorReadsTheCartFileThatIsGiven) {
   (void)Run({"doctor", "--out", folder_.string(), "--cart", cart_.string()});
   EXPECT_TRUE(Said("✓ cart                " + cart_.string() + ", \"bench\"")) << said_;
+  EXPECT_TRUE(Said("domain 80")) << said_;
   WriteFile(cart_, "domain: 500\n");
   EXPECT_EQ(Run({"doctor", "--out", folder_.string(), "--cart", cart_.string()}), 1);
   EXPECT_TRUE(Said("✗ cart")) << said_;
