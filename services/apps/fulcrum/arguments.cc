@@ -1,3 +1,4 @@
+#include <poll.h>
 #include <unistd.h>
 
 #include <climits>
@@ -101,6 +102,11 @@ std::filesystem::path DatabaseOf(const Arguments& arguments) {
   return arguments.values.count("database") != 0
              ? std::filesystem::absolute(arguments.values["database"].as<std::string>())
              : UserFolder("XDG_STATE_HOME", ".local/state") / "trainees.sqlite";
+}
+
+bool ReaderIsGone() {
+  pollfd output{STDOUT_FILENO, 0, 0};
+  return ::poll(&output, 1, 0) == 1 && (output.revents & (POLLERR | POLLHUP)) != 0;
 }
 
 }  // namespace fulcrum::supervisor::cli

@@ -94,6 +94,9 @@ void AddDatabase(boost::program_options::options_description* options);
 /// Value of --database, else the default file.
 [[nodiscard]] std::filesystem::path DatabaseOf(const Arguments& arguments);
 
+/// True when standard output is a pipe or socket whose other end is closed.
+[[nodiscard]] bool ReaderIsGone();
+
 /// Sends a command to the supervisor of the domain and prints its reply. Throws InputError when none runs there.
 ExitCode Ask(int domain, const std::string& verb, const std::string& argument);
 

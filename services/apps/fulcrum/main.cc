@@ -1,6 +1,8 @@
 // fulcrum: the command with which an operator runs a cart.
 #include <cstdio>
 #include <exception>
+#include <iostream>
+#include <stdexcept>
 
 #include "services/apps/fulcrum/commands.h"
 #include "services/base/core/error.h"
@@ -16,7 +18,14 @@ int main(int argc, char** argv) {
     return static_cast<int>(code);
   };
   try {
-    return static_cast<int>(fulcrum::supervisor::cli::Dispatch({argv + 1, argv + argc}));
+    const ExitCode code = fulcrum::supervisor::cli::Dispatch({argv + 1, argv + argc});
+    std::cout.flush();
+    // A reader that has seen enough, such as head, has closed its end; a full disk is a fault.
+    if ((std::fflush(stdout) != 0 || std::ferror(stdout) != 0 || !std::cout) && code == ExitCode::kDone &&
+        !fulcrum::supervisor::cli::ReaderIsGone()) {
+      throw std::runtime_error("the output could not be written; is the disk full?");
+    }
+    return static_cast<int>(code);
   } catch (const fulcrum::InputError& error) {
     return fail(ExitCode::kBadUsage, error);
   } catch (const fulcrum::MismatchError& error) {

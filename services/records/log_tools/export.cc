@@ -6,6 +6,7 @@
 #include "services/base/core/error.h"
 #include "services/records/log_tools/text.h"
 #include "services/records/log_tools/tools.h"
+#include "services/transport/bus/topics.h"
 
 namespace fulcrum::log_tools {
 namespace {
@@ -54,6 +55,13 @@ std::vector<std::filesystem::path> ExportTables(const std::filesystem::path& fil
       table << row << '\n';
     });
     if (!table) throw InputError(files.back().string() + ": cannot be written; is the disk full?");
+  }
+  // The rest of a table reaches the disk only now.
+  for (auto& [topic, table] : tables) {
+    table.close();
+    if (!table) {
+      throw InputError((folder / bus::TopicLabel(topic)).string() + ".csv: cannot be written; is the disk full?");
+    }
   }
   return files;
 }

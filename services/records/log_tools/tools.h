@@ -22,7 +22,8 @@ void PrintList(const std::filesystem::path& folder, std::ostream* out);
 /// Prints one JSON object per line. Lists longer than `longest` are cut.
 void PrintMessages(const std::filesystem::path& file, const Filter& filter, std::size_t longest, std::ostream* out);
 
-/// Writes one table per topic, `folder`/TOPIC.csv. Returns the files. Throws InputError rather than replace one.
+/// Writes one table per topic, `folder`/TOPIC.csv. Returns the files. Throws InputError rather than replace one,
+/// and when one cannot be written whole.
 std::vector<std::filesystem::path> ExportTables(const std::filesystem::path& file, const Filter& filter,
                                                 const std::filesystem::path& folder);
 

@@ -87,5 +87,15 @@ TEST_F(CommandsTest, TheDoctorReadsTheCartFileThatIsGiven) {
   EXPECT_TRUE(Said("✗ cart")) << said_;
 }
 
+TEST_F(CommandsTest, OutputThatCannotBeWrittenIsAFailure) {
+  const std::string program = FULCRUM_BIN_DIR "/fulcrum";
+  EXPECT_EQ(Run({"-c", "$0 help >/dev/full", program}, "/bin/bash"), 1);
+  EXPECT_TRUE(Said("the output could not be written")) << said_;
+  EXPECT_EQ(Run({"-c", "$0 reference cart " FULCRUM_SOURCE_DIR "/deploy/carts/simulated.yaml >/dev/full", program},
+                "/bin/bash"),
+            1);
+  EXPECT_EQ(Run({"-c", "$0 help | true; exit ${PIPESTATUS[0]}", program}, "/bin/bash"), 0) << said_;
+}
+
 }  // namespace
 }  // namespace fulcrum::supervisor

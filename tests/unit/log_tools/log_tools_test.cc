@@ -1,7 +1,9 @@
 // The tools of `fulcrum log` on recordings with known content.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -158,6 +160,25 @@ TEST_F(LogTools, ExportWritesATableATopic) {
   const auto columns = [](const std::string& line) { return std::count(line.begin(), line.end(), ','); };
   for (const std::string& line : lines) EXPECT_EQ(columns(line), columns(lines[0]));
   EXPECT_THROW((void)ExportTables(file, {}, folder_ / "tables"), InputError) << "existing files are not replaced";
+}
+
+TEST_F(LogTools, ExportReportsATableThatIsNotWholeOnTheDisk) {
+  const fs::path file = Make("a.mcap");
+  // The few rows are in the stream's buffer until the table is closed.
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const rlimit small{64, before.rlim_max};
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  std::string said;
+  try {
+    (void)ExportTables(file, {.topics = {"ToolState"}}, folder_ / "tables");
+  } catch (const InputError& error) {
+    said = error.what();
+  }
+  ::setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_EQ(said, (folder_ / "tables" / "ToolState.csv").string() + ": cannot be written; is the disk full?");
 }
 
 TEST_F(LogTools, VerifyFindsGapsDamageAndWhatNoNodeWouldUse) {
