@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <climits>
+#include <cstdio>
 #include <cstdlib>
 #include <iostream>
 
@@ -108,5 +109,7 @@ bool ReaderIsGone() {
   pollfd output{STDOUT_FILENO, 0, 0};
   return ::poll(&output, 1, 0) == 1 && (output.revents & (POLLERR | POLLHUP)) != 0;
 }
+
+bool OutputHasEnded() { return std::ferror(stdout) != 0 || ReaderIsGone(); }
 
 }  // namespace fulcrum::supervisor::cli

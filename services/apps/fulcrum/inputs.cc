@@ -57,7 +57,7 @@ ExitCode Inputs(const Words& words) {
       }
     }
     if (watch) std::this_thread::sleep_for(kRead);
-  } while (watch && !runtime::ShouldStop() && std::chrono::steady_clock::now() < end);
+  } while (watch && !runtime::ShouldStop() && !OutputHasEnded() && std::chrono::steady_clock::now() < end);
   return ExitCode::kDone;
 }
 

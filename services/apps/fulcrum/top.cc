@@ -27,7 +27,7 @@ ExitCode Top(const Words& words) {
   const bool terminal = ::isatty(STDOUT_FILENO) == 1;
   constexpr auto kRefresh = std::chrono::milliseconds(500);
   auto next = std::chrono::steady_clock::now() + kRefresh;
-  while (!runtime::ShouldStop() && DomainGuard::IsHeld(domain)) {
+  while (!runtime::ShouldStop() && !OutputHasEnded() && DomainGuard::IsHeld(domain)) {
     view.Update();
     if (const std::string mismatch = view.mismatch(); !mismatch.empty()) throw MismatchError(mismatch);
     if (std::chrono::steady_clock::now() >= next) {

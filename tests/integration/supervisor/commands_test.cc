@@ -97,5 +97,13 @@ TEST_F(CommandsTest, OutputThatCannotBeWrittenIsAFailure) {
   EXPECT_EQ(Run({"-c", "$0 help | true; exit ${PIPESTATUS[0]}", program}, "/bin/bash"), 0) << said_;
 }
 
+TEST_F(CommandsTest, WhatPrintsWithoutEndEndsWithItsReader) {
+  const std::string program = FULCRUM_BIN_DIR "/fulcrum";
+  EXPECT_EQ(Run({"-c", "timeout 20 $0 inputs --watch --json | head -n 1; exit ${PIPESTATUS[0]}", program}, "/bin/bash"),
+            0)
+      << said_;
+  EXPECT_EQ(Run({"-c", "timeout 20 $0 inputs --watch >/dev/full", program}, "/bin/bash"), 1) << said_;
+}
+
 }  // namespace
 }  // namespace fulcrum::supervisor
