@@ -1,9 +1,11 @@
 // Options and output of the command `fulcrum` where no session runs.
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <thread>
@@ -87,6 +89,25 @@ TEST_F(CommandsTest, TheDoctorReadsTheCartFileThatIsGiven) {
   EXPECT_TRUE(Said("✗ cart")) << said_;
 }
 
+TEST_F(CommandsTest, TheDoctorJudgesSocketsAsTheBusMakesThem) {
+  const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  const int size = 4 << 20;
+  const bool may = ::setsockopt(socket, SOL_SOCKET, SO_RCVBUFFORCE, &size, sizeof size) == 0;
+  ::close(socket);
+  if (!may) GTEST_SKIP() << "this user may not pass the limit of socket buffers";
+  (void)Run({"doctor", "--out", folder_.string()});
+  EXPECT_TRUE(Said("✓ socket buffers")) << said_;
+}
+
+TEST_F(CommandsTest, WaylandAloneIsNoDisplayForTheWindow) {
+  ::unsetenv("DISPLAY");
+  ::setenv("WAYLAND_DISPLAY", "wayland-0", 1);
+  (void)Run({"doctor", "--out", folder_.string()});
+  EXPECT_TRUE(Said("✓ display             none: pictures are drawn off screen")) << said_;
+  ::unsetenv("WAYLAND_DISPLAY");
+}
+
+// In these lines of the shell $0 is the command.
 TEST_F(CommandsTest, OutputThatCannotBeWrittenIsAFailure) {
   const std::string program = FULCRUM_BIN_DIR "/fulcrum";
   EXPECT_EQ(Run({"-c", "$0 help >/dev/full", program}, "/bin/bash"), 1);
