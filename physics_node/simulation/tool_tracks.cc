@@ -2,6 +2,8 @@
 //
 //   p' = p + (p_in - p) / n,   q' = slerp(q, q_in, 1 / n),   n = max(1, |p_in - p| / (v h), angle(q, q_in) / (omega h))
 //
+//   jaw' = jaw limited to [jaw_in - kJawPlay_rad, jaw_in]
+//
 //   p, q, p_in, q_in  last pose and input, frame W        v, omega  kMaxToolSpeed, kMaxToolTurn        h  step [s]
 #include <algorithm>
 #include <cmath>
@@ -13,6 +15,10 @@ namespace {
 
 /// Movement in a step below which a tool is at rest [m]: far below the resolution of a haptic device, 9 um.
 constexpr float kToolStill = 1e-7f;
+/// Play of the jaws' angle [rad]: they open only by what exceeds it, so the noise of a handle at rest, up to 12 mrad to
+/// either side (handle_bridge), neither counts as closing nor keeps touched tissue awake. A closing is followed
+/// exactly.
+constexpr float kJawPlay_rad = 0.024f;
 
 float AngleBetween(const Quatf& a, const Quatf& b) { return 2.0f * std::acos(std::min(1.0f, std::abs(a.dot(b)))); }
 
@@ -44,8 +50,10 @@ void TissueSimulation::FollowTools(const std::array<ToolInput, kMaxTools>& tools
     if (!track.present) {
       continue;
     }
-    track.last = appears ? tools[i].pose : track.now;
-    track.now = Approach(track.last, tools[i].pose, kMaxToolSpeed * step_s(), kMaxToolTurn * step_s());
+    ToolPose wanted = tools[i].pose;
+    track.last = appears ? wanted : track.now;
+    wanted.jaw_rad = std::clamp(track.last.jaw_rad, wanted.jaw_rad - kJawPlay_rad, wanted.jaw_rad);
+    track.now = Approach(track.last, wanted, kMaxToolSpeed * step_s(), kMaxToolTurn * step_s());
   }
 }
 
@@ -64,8 +72,10 @@ void TissueSimulation::FindContacts(bool tissue_moved, float tissue_step) {
   std::array<ToolCollision::ToolMotion, kMaxTools> motions;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     if (tracks_[i].present) {
+      // The handle of a suction tube is a valve.
+      const bool has_jaws = scene_.tools[i].kind == ToolKind::kGrasper || scene_.tools[i].kind == ToolKind::kScissors;
       motions[i] = {ShapeOf(scene_.tools[i], tracks_[i].last), ShapeOf(scene_.tools[i], tracks_[i].now),
-                    grasps_[i].holding(), tracks_[i].now.jaw_rad < tracks_[i].last.jaw_rad};
+                    grasps_[i].holding(), has_jaws && tracks_[i].now.jaw_rad < tracks_[i].last.jaw_rad};
     }
   }
   collision_.FindPairs(motions, tissue_moved, tissue_step);

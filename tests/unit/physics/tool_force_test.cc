@@ -73,14 +73,16 @@ TEST_F(ForceOfATool, IsCalmAlongTheSurface) {
   EXPECT_LT(Roughness(Vec3f(0, 0.004f, 0), 0.003f, 0), kCalm);
 }
 
-/// Published forces on a tool that presses with 20 mm/s, step by step.
-std::vector<ToolForce> Press(const SceneView& scene) {
+/// Published forces on a tool that presses with 20 mm/s, step by step; `jaw_rad(step)` is the angle of its handle.
+template <class Angle>
+std::vector<ToolForce> Press(const SceneView& scene, const Angle& jaw_rad) {
   TissueSimulation simulation(scene);
   const Vec3f place = scene.rest_position[scene.membrane.first + 144 * scene.membrane.cols + 25];
   std::array<ToolInput, kMaxTools> tools;
   std::vector<ToolForce> forces;
+  int step = 0;
   for (float time = 0; time < 0.45f; time += scene.physics.dt_s) {
-    tools[0] = {true, PoseAtTip(scene.tools[0], place + Vec3f(0, 0, 0.003f - 0.02f * time), 0.35f)};
+    tools[0] = {true, PoseAtTip(scene.tools[0], place + Vec3f(0, 0, 0.003f - 0.02f * time), jaw_rad(step++))};
     simulation.Step(tools);
     const DeviceContacts device = simulation.Contacts(0);
     if (device.count > 0) {
@@ -88,6 +90,32 @@ std::vector<ToolForce> Press(const SceneView& scene) {
     }
   }
   return forces;
+}
+std::vector<ToolForce> Press(const SceneView& scene) {
+  return Press(scene, [](int) { return 0.35f; });
+}
+
+TEST_F(ForceOfATool, OfJawsAtRestDoesNotDependOnTheNoiseOfTheHandle) {
+  const std::vector<ToolForce> still = Press(scene_),
+                               noisy = Press(scene_, [](int step) { return step / 4 % 2 == 0 ? 0.345f : 0.355f; });
+  ASSERT_EQ(still.size(), noisy.size());
+  EXPECT_GT(still.back().force.z(), 0.3f);
+  // The jaws are 5 mrad less open, hence the tips up to 0.04 mm elsewhere.
+  EXPECT_NEAR(noisy.back().force.z(), still.back().force.z(), 0.05f * still.back().force.z());
+}
+
+/// The handle of a suction tube is a valve: squeezed, the tube presses as before.
+TEST_F(ForceOfATool, OfASuctionTubeDoesNotDependOnItsHandle) {
+  SceneView scene = scene_;
+  scene.tools[0].kind = ToolKind::kSuction;
+  const std::vector<ToolForce> still = Press(scene),
+                               squeezed =
+                                   Press(scene, [](int step) { return 0.5f - 0.01f * static_cast<float>(step); });
+  ASSERT_EQ(still.size(), squeezed.size());
+  EXPECT_GT(still.back().force.z(), 0.3f);
+  for (std::size_t i = 0; i < still.size(); ++i) {
+    ASSERT_EQ(squeezed[i].force, still[i].force) << "step " << i;
+  }
 }
 
 /// A tool that presses or holds and does not move: the tissue falls asleep, region by region, and the force stays.
