@@ -322,6 +322,8 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   const float dent = -memory.normal.dot(memory.u);
   const float margin = collision.MarginAt(at_sheet ? nearest.triangle : kNoIndex, TipPart(scene_, tool));
   contact.gap = touching ? 0.0f : std::max(0.0f, nearest.gap - margin);
+  // What is left in the filter after contact is no force: the servo would take it for the depth instead of the gap.
+  if (contact.gap > 0.0f) contact.f_ref.setZero();
   contact.p_s = pose.p_WT + (touching ? push / contact.k1 + dent : -contact.gap) * memory.normal;
   const PrincipalCurvatures surface =
       RolledOver(curvature_.At(nearest, touching, memory.normal), scene_.tools[tool].tip_radius_m + margin);
@@ -329,7 +331,7 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   contact.kappa1 = surface.kappa1;
   contact.kappa2 = surface.kappa2;
   contact.radius = kSurfaceRadius;
-  device.p_ext_W = std::clamp(memory.force.dot(memory.v_s), 0.0f, kMaxExternal);
+  device.p_ext_W = std::clamp(contact.f_ref.dot(memory.v_s), 0.0f, kMaxExternal);
   device.contacts[device.count++] = contact;
   return device;
 }

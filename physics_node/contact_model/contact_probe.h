@@ -4,7 +4,8 @@
 //   f_ref   force of the tissue on the tool [N]. With the force of the solver: of a grasp unfiltered; of a surface the
 //           last step, kept near the median of kMedian, older ones changed by the stiffness for the way of the tip,
 //           with x_ref the mean place of the tip meanwhile, as f_ref is a mean over the last period of a step. Else the
-//           elastic force of the edges of the touched or held particles (elastic_force.h), low-passed over kFilterTime
+//           elastic force of the edges of the touched or held particles (elastic_force.h), low-passed over kFilterTime.
+//           0 where there is a gap
 //   u_c     displacement of the tissue at the contact relative to its surroundings, a ring at kRingRadius [m]: a tent
 //           raised by the other tool is no dent of this one
 //   k1, kt  skin [N/m]: a small disc of the membrane resists with E t independent of its size
