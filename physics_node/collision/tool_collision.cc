@@ -16,6 +16,7 @@
 #include <cmath>
 
 #include "services/base/core/sheet_heat.h"
+#include "services/base/core/sheets.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -64,6 +65,7 @@ ToolCollision::ToolCollision(const TissueScene& scene, const TissueModel* model,
       particles_(particles),
       kernels_(kernels),
       membrane_triangles_(scene.membrane.triangle_count()),
+      sheet_of_(SheetOfRows(scene)),
       thickness_(ThicknessOfRows(scene)),
       thickest_m_(scene.thermal.thickness_m),
       bounds_(scene, model, particles, kernels) {
@@ -240,20 +242,30 @@ void ToolCollision::FindMembranePairs(std::uint32_t capsule, float range) {
   Flush(capsule, range);
 }
 
-/// A capsule is on one side of all the membrane around it, except at a hole or a rim: that of the pairs that touched in
+/// The pairs of a capsule from `first` on, sheet by sheet: they follow each other by rows, so those of a sheet do.
+void ToolCollision::UnifySides(std::size_t first) {
+  const auto sheet_of = [this](const ContactPair& pair) {
+    return sheet_of_[pair.triangle / 2 / (scene_.membrane.cols - 1)];
+  };
+  const std::span<ContactPair> pairs = std::span(pairs_).subspan(first);
+  for (std::size_t begin = 0, end = 0; begin < pairs.size(); begin = end) {
+    while (end < pairs.size() && sheet_of(pairs[end]) == sheet_of(pairs[begin])) ++end;
+    UnifySidesOfSheet(pairs.subspan(begin, end - begin));
+  }
+}
+
+/// A capsule is on one side of all of a sheet around it, except at a hole or a rim: that of the pairs that touched in
 /// the last step if these agree, else that of all pairs if these agree. A single pair can be wrong: the tool is below
 /// the level of the flat membrane around the pit that it presses.
-void ToolCollision::UnifySides(std::size_t first) {
+void ToolCollision::UnifySidesOfSheet(std::span<ContactPair> pairs) {
   for (const bool touched : {true, false}) {
     bool above = false, below = false;
-    for (std::size_t i = first; i < pairs_.size(); ++i) {
-      above |= pairs_[i].side > 0 && (pairs_[i].side_kept || !touched);
-      below |= pairs_[i].side < 0 && (pairs_[i].side_kept || !touched);
+    for (const ContactPair& pair : pairs) {
+      above |= pair.side > 0 && (pair.side_kept || !touched);
+      below |= pair.side < 0 && (pair.side_kept || !touched);
     }
     if (above != below) {
-      for (std::size_t i = first; i < pairs_.size(); ++i) {
-        pairs_[i].side = above ? 1 : -1;
-      }
+      for (ContactPair& pair : pairs) pair.side = above ? 1 : -1;
     }
     if (above || below) {
       return;

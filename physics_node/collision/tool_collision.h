@@ -142,6 +142,7 @@ class ToolCollision {
 
   void FindMembranePairs(std::uint32_t capsule, float range);
   void UnifySides(std::size_t first);
+  static void UnifySidesOfSheet(std::span<ContactPair> pairs);
   void SortPairs();
   void FindTubePairs(std::uint32_t capsule, float range);
   /// Collects candidates in batches of eight for the kernel; Flush processes an incomplete batch.
@@ -186,8 +187,9 @@ class ToolCollision {
   ParticleStore* particles_;
   const collision::Kernels& kernels_;
   Index membrane_triangles_;
-  std::vector<float> thickness_;  ///< Of the sheet, by row of the grid [m]; empty: everywhere that of `thermal`.
-  float thickest_m_;              ///< Of all sheets and `thermal`.
+  std::vector<std::size_t> sheet_of_;  ///< By row of the grid.
+  std::vector<float> thickness_;       ///< Of the sheet, by row of the grid [m]; empty: everywhere that of `thermal`.
+  float thickest_m_;                   ///< Of all sheets and `thermal`.
   SurfaceBounds bounds_;
   std::vector<ParticleRef> column_;  ///< Nodes of the first row.
   std::array<Motion, kMaxTools * kMaxCapsules> motion_;

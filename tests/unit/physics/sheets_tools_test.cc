@@ -1,0 +1,66 @@
+// Tools at several sheets: between two of them.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "physics_node/simulation/tissue_simulation.h"
+#include "tests/support/flat_sheets.h"
+
+namespace fulcrum::physics {
+namespace {
+
+/// Two sheets of 30 x 22 nodes, all of their rims held: the second `offset` from the first, which is about the origin.
+scene::SceneData TwoSheets(PhysicsMode mode, const Vec3d& offset) {
+  const Vec3d corner(-10.5 * kFlatCell_m, -14.5 * kFlatCell_m, 0), row(0, kFlatCell_m, 0), col(kFlatCell_m, 0, 0);
+  scene::Anatomy anatomy;
+  anatomy.sheets.push_back(FlatSheet("first", 30, 22, corner, row, col));
+  anatomy.sheets.push_back(FlatSheet("second", 30, 22, corner + offset, row, col));
+  return scene::AssembleScene(SheetSettings(mode), anatomy);
+}
+
+/// Largest and least height of the nodes of a sheet over rest [m].
+std::pair<float, float> HeightsOf(const TissueSimulation& simulation, const SceneView& scene, const SheetPart& sheet) {
+  float least = 0, largest = 0;
+  for (std::uint32_t row = 0; row < sheet.rows; ++row) {
+    for (std::uint32_t col = 0; col < sheet.cols; ++col) {
+      const Index p = SheetParticle(scene, sheet, row, col);
+      const float z = simulation.particles().At(simulation.particles().Ref(p)).z() - scene.rest_position[p].z();
+      least = std::min(least, z);
+      largest = std::max(largest, z);
+    }
+  }
+  return {least, largest};
+}
+
+class BetweenTwoSheets : public testing::TestWithParam<PhysicsMode> {};
+
+/// A bar between two sheets presses the lower one, near to the upper one but clear of it.
+TEST_P(BetweenTwoSheets, AToolPressesOneOnly) {
+  const scene::SceneData data = TwoSheets(GetParam(), Vec3d(0, 0, 0.004));
+  SceneView scene = data.View();
+  scene.tools[0].kind = ToolKind::kSuction;
+  constexpr float kReach_m = 0.0019f;  // of the bar's axis from a sheet in contact: 0.2 mm of play between the two
+  scene.tools[0].tip_length_m = 0.02f;
+  scene.tools[0].tip_radius_m = scene.tools[0].shaft_radius_m = kReach_m - ContactMargin(scene, ToolPart::kJaw);
+  const Quatf level = Quatf::FromTwoVectors(Vec3f::UnitZ(), Vec3f::UnitX());
+  TissueSimulation simulation(scene);
+  std::array<ToolInput, kMaxTools> tools{};
+  for (int i = 0; i < 120; ++i) {
+    const float height = 0.002f - 0.00002f * static_cast<float>(std::clamp(i - 20, 0, 30));
+    tools[0] = {true, {Vec3f(0.008f, 0.003f, height), level, 0}};
+    simulation.Step(tools);
+  }
+  const auto [pressed, raised] = HeightsOf(simulation, scene, scene.sheets[0]);
+  EXPECT_LT(pressed, -0.0003f);
+  EXPECT_LT(raised, 0.0002f);
+  const auto [least, largest] = HeightsOf(simulation, scene, scene.sheets[1]);
+  EXPECT_GT(least, -1e-6f);
+  EXPECT_LT(largest, 1e-6f);
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes, BetweenTwoSheets,
+                         testing::Values(PhysicsMode::kPaper, PhysicsMode::kXpbd, PhysicsMode::kAccurate));
+
+}  // namespace
+}  // namespace fulcrum::physics
