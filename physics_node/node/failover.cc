@@ -50,11 +50,13 @@ void Failover::TakeOver(const Tick& tick) {
 }
 
 /// Nothing that this process computed since the other one took over was read. To take over again it needs a node in the
-/// state of a new process.
+/// state of a new process, which its ports do not tell of the cut again.
 void Failover::Retire() {
   const std::lock_guard lock(replacing_);
   leads_.store(false, std::memory_order_relaxed);
+  const PhysicsNode::Kept kept = node_->KeptInputs();
   make_(true, &node_);
+  node_->TakeKept(kept);
   runtime::Log(runtime::LogLevel::kWarning,
                "the other process has taken over while this one was held up: it follows from now on");
 }

@@ -76,6 +76,13 @@ bool PhysicsNode::Restore(std::span<const std::byte> checkpoint) {
   return true;
 }
 
+void PhysicsNode::TakeKept(const Kept& kept) {
+  topology_state_ = kept.topology;
+  open_cells_ = kept.open_cells;
+  topology_waits_ = kept.topology.stamp.sequence != 0;
+  open_cells_wait_ = kept.open_cells.stamp.sequence != 0;
+}
+
 void PhysicsNode::Follow(const Tick& tick) {
   ticks_.last_index = tick.index;
   // Inputs are not applied before this process leads; from then on it behaves as a new process.
@@ -192,9 +199,10 @@ void PhysicsNode::TakeInputs(const Tick& tick) {
     }
   }
   topology_waits_ = false;
-  if (ports_.open_cells.TakeLatest(&open_cells_) && !simulation_.SetOpenCells(open_cells_)) {
+  if ((ports_.open_cells.TakeLatest(&open_cells_) || open_cells_wait_) && !simulation_.SetOpenCells(open_cells_)) {
     figures_.topology_refused.fetch_add(1, std::memory_order_relaxed);
   }
+  open_cells_wait_ = false;
 }
 
 /// A skipped period means that the last step ran late: a cheaper preset is set for some time. The first step, which

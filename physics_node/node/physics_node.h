@@ -48,6 +48,15 @@ class PhysicsNode {
   /// Enables the threads beside the caller's for the next steps; they are enabled at the start.
   void LetThreadsHelp(bool help) { simulation_.LetThreadsHelp(help); }
 
+  /// Inputs that are written on a change only: the ports do not deliver them again to a node that replaces this one.
+  struct Kept {
+    TopologyState topology;
+    OpenCells open_cells;
+  };
+  [[nodiscard]] Kept KeptInputs() const { return {topology_state_, open_cells_}; }
+  /// Before the first tick: those of the node that this one replaces, applied in the first Step().
+  void TakeKept(const Kept& kept);
+
   /// In place of Step() while another process leads: stores the newest inputs and publishes nothing.
   void Follow(const Tick& tick);
   /// From this tick on this process leads and continues from the newer one of the other's checkpoint, which can be
@@ -113,7 +122,8 @@ class PhysicsNode {
   OpenCells open_cells_;
   std::array<ToolInput, kMaxTools> inputs_;
   std::array<int, kMaxTools> absent_ticks_{};
-  bool topology_waits_ = false;  ///< A topology arrived while another process led.
+  bool topology_waits_ = false;   ///< A topology arrived while another process led, or was taken over.
+  bool open_cells_wait_ = false;  ///< Likewise.
   struct Ticks {
     std::uint64_t count = 0;
     std::int64_t start_ns = 0;  ///< Of the first step.
