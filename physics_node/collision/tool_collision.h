@@ -72,6 +72,8 @@ class ToolCollision {
   /// When the tissue comes to rest: fits the bounds of all tissue, not only of that near the tools, so that they stay
   /// valid for any tool position until the tissue moves.
   void FitAtRest();
+  /// After positions have been restored: the next FindPairs looks for tissue everywhere.
+  void Restart() { bounds_.Invalidate(); }
   /// Projects the tissue along the motion of the tools in this step.
   void Sweep();
   /// Projects the tissue out of the tools at their positions at the end of the step.

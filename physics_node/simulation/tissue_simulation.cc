@@ -469,6 +469,7 @@ bool TissueSimulation::Restore(std::span<const float> xyz, std::span<const float
     grasps_[i].Restore(memory.grasp_state[i], memory.held[i], &particles_);
   }
   tears_.Restore(memory.torn_edges);
+  collision_.Restart();
   sheet_collision_.Restart();
   counters_.steps = counters_.periods = memory.periods;
   sleep_.asleep = false;

@@ -1,4 +1,4 @@
-// Tools at several sheets: between two of them.
+// Tools at several sheets: between two of them, and after a restart.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -61,6 +61,30 @@ TEST_P(BetweenTwoSheets, AToolPressesOneOnly) {
 
 INSTANTIATE_TEST_SUITE_P(Modes, BetweenTwoSheets,
                          testing::Values(PhysicsMode::kPaper, PhysicsMode::kXpbd, PhysicsMode::kAccurate));
+
+/// Tissue that was far from rest at the checkpoint is found by tools in the first step.
+TEST(SheetsRestored, AreFoundFarFromRest) {
+  const scene::SceneData data = TwoSheets(PhysicsMode::kAccurate, Vec3d(0.1, 0, 0));
+  const SceneView scene = data.View();
+  TissueSimulation simulation(scene), next(scene);
+  std::vector<float> xyz(3 * scene.rest_position.size());
+  simulation.particles().CopyPositions(xyz);
+  const SheetPart& sheet = scene.sheets[0];
+  const auto rows = static_cast<float>(sheet.rows - 1), cols = static_cast<float>(sheet.cols - 1);
+  constexpr float kPi = 3.14159265f, kLift_m = 0.05f;
+  for (std::uint32_t row = 0; row < sheet.rows; ++row) {
+    for (std::uint32_t col = 0; col < sheet.cols; ++col) {
+      xyz[3 * SheetParticle(scene, sheet, row, col) + 2] +=
+          kLift_m * std::sin(kPi * static_cast<float>(row) / rows) * std::sin(kPi * static_cast<float>(col) / cols);
+    }
+  }
+  std::array<ToolInput, kMaxTools> tools{};
+  tools[0] = {true, {Vec3f(0, 0, kLift_m), Quatf(0, 1, 0, 0), 0}};
+  simulation.Step(tools);
+  ASSERT_TRUE(next.Restore(xyz, xyz, simulation.Save()));
+  next.Step(tools);
+  EXPECT_FALSE(next.collision().pairs().empty());
+}
 
 }  // namespace
 }  // namespace fulcrum::physics
