@@ -90,7 +90,12 @@ void TearWatch::Crack(std::uint32_t row, std::uint32_t col) {
   const auto sum = SumsAt(row, col);  // 3, 4, 5: the metric at rest, times the sum of the weights, which cancels.
   const Place v = At(row, col).along;
   Place w{-(sum[4] * v.col + sum[5] * v.row), sum[3] * v.col + sum[4] * v.row};
-  const float cell_col = scene_.membrane_rest_length[3 * a], cell_row = scene_.membrane_rest_length[3 * a + 1];
+  // At the last column or row of a sheet there is no edge beyond: the one before.
+  const auto cell_edge = [&](Index d, Index before) {
+    const float length_m = scene_.membrane_rest_length[3 * a + d];
+    return length_m > 0.0f || a < before ? length_m : scene_.membrane_rest_length[3 * (a - before) + d];
+  };
+  const float cell_col = cell_edge(0, 1), cell_row = cell_edge(1, cols_);
   const float length = std::hypot(w.col, w.row);
   if (!(length > 0.0f)) return;
   w = {w.col / length, w.row / length};

@@ -1,10 +1,11 @@
-// Tools at several sheets: between two of them, and after a restart.
+// Tools at several sheets: between two of them, and after a restart. Cracks at the rim of a sheet.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "physics_node/simulation/tissue_simulation.h"
+#include "physics_node/tear/tear_watch.h"
 #include "tests/support/flat_sheets.h"
 
 namespace fulcrum::physics {
@@ -84,6 +85,37 @@ TEST(SheetsRestored, AreFoundFarFromRest) {
   ASSERT_TRUE(next.Restore(xyz, xyz, simulation.Save()));
   next.Step(tools);
   EXPECT_FALSE(next.collision().pairs().empty());
+}
+
+/// A crack is as long at the last column and row of a sheet, whose nodes have no edge beyond, as at the first.
+TEST(TearsOfASheet, AreAsLongAtTheLastColumnAsAtTheFirst) {
+  scene::SceneSettings settings = SheetSettings(PhysicsMode::kAccurate);
+  settings.physics.tear_stretch = 1.4f;
+  settings.physics.membrane_prestrain = 0;
+  scene::Anatomy anatomy;
+  anatomy.sheets.push_back(FlatSheet("wide", 31, 31, Vec3d(-0.015, -0.015, 0), Vec3d(0, 0.001, 0), Vec3d(0.001, 0, 0)));
+  const scene::SceneData data = scene::AssembleScene(settings, anatomy);
+  const SceneView scene = data.View();
+  // Pulled along one direction, most where the other coordinate is largest or least; all of the sheet is near the
+  // limit.
+  const auto torn = [&](int along, float most_at) {
+    ParticleStore particles(scene);
+    TissueModel model(scene, &particles);
+    TearWatch tears(scene, &model, &particles);
+    for (Index node = 0; node < scene.membrane.node_count(); ++node) {
+      Vec3f p = scene.rest_position[scene.membrane.first + node];
+      p[along] *= 1.42f + most_at * 2.0f * p[1 - along];
+      particles.Set(particles.Ref(scene.membrane.first + node), p);
+    }
+    tears.RowsMoved(0, scene.membrane.rows, 0.1f);
+    EXPECT_TRUE(tears.Evaluate(10));
+    return tears.torn_count();
+  };
+  for (const int along : {0, 1}) {
+    const std::uint32_t at_first = torn(along, -1), at_last = torn(along, 1);
+    EXPECT_EQ(at_first, at_last) << (along == 1 ? "columns" : "rows");
+    EXPECT_LE(at_last, 14u) << "5 cells in one direction, of each the edge and the diagonal";
+  }
 }
 
 }  // namespace
