@@ -84,7 +84,10 @@ void SetFirstGuess(const SolverContext& context, std::span<const ParticleRef> at
 
 bool ImplicitSolver::Stiffness(const StiffnessQuery& query, float* newton_per_m) {
   const RegionSet& computed = state_.regions.computed();
-  if (state_.regions.none_computed() || query.at.empty()) {
+  // Where a region sleeps, the residual is that of an older step.
+  if (query.at.empty() || !std::all_of(query.at.begin(), query.at.end(), [this](ParticleRef at) {
+        return state_.regions.computed(model_.partition.Of(at));
+      })) {
     return false;
   }
   Linearisation& at = state_.linearisation;
@@ -109,8 +112,7 @@ bool ImplicitSolver::Stiffness(const StiffnessQuery& query, float* newton_per_m)
   });
   std::fill(scratch_.wanted.begin(), scratch_.wanted.end(), std::uint8_t{0});
   for (const ParticleRef particle : query.at) {
-    const int region = model_.partition.Of(particle);
-    scratch_.wanted[static_cast<std::size_t>(region)] = state_.regions.computed(region) ? 1 : 0;
+    scratch_.wanted[static_cast<std::size_t>(model_.partition.Of(particle))] = 1;
   }
   solver.SelectResidual(scratch_.wanted);
   solver.Solve(kQueryIterations);

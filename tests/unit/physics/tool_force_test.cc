@@ -144,6 +144,37 @@ TEST_F(ForceOfATool, StaysWhileTheTissueFallsAsleep) {
   }
 }
 
+/// Where the tissue around a tool sleeps, the solver has no residual of now to answer a stiffness query with.
+TEST_F(ForceOfATool, KeepsItsStiffnessAsleepWhileAnotherToolMoves) {
+  TissueSimulation simulation(scene_);
+  const auto node = [&](Index row) {
+    return scene_.rest_position[scene_.membrane.first + row * scene_.membrane.cols + 25];
+  };
+  std::array<ToolInput, kMaxTools> tools;
+  DeviceContacts device;
+  const auto step = [&](float time) {
+    const float in = std::min(time / kPress_s, 1.0f);
+    tools[0] = {true, PoseAtTip(scene_.tools[0], node(144) + Vec3f(0, 0, 0.003f - 0.006f * in), 0.35f)};
+    simulation.Step(tools);
+    device = simulation.Contacts(0);
+  };
+  for (int i = 0; i < 300; ++i) step(0.01f * static_cast<float>(i));
+  ASSERT_LT(simulation.awake_part(), 0.02f);
+  ASSERT_EQ(device.count, 1u);
+  const Contact still = device.contacts[0];
+  float moved = 0;
+  for (int i = 0; i < 200; ++i) {
+    const float depth = 0.003f * (1 - std::cos(0.1f * static_cast<float>(i)));
+    tools[1] = {true, PoseAtTip(scene_.tools[1], node(40) + Vec3f(0, 0, 0.003f - depth), 0)};
+    step(3.0f);
+    ASSERT_EQ(device.count, 1u);
+    ASSERT_NEAR(device.contacts[0].k_body, still.k_body, 0.02f * still.k_body) << "step " << i;
+    ASSERT_NEAR(device.contacts[0].b_body, still.b_body, 0.02f * still.b_body) << "step " << i;
+    moved = std::max(moved, simulation.collision().force(1).norm());
+  }
+  EXPECT_GT(moved, 0.1f);
+}
+
 /// Two iterations leave the contacts ahead of the tissue: the sum of their forces is 13 % too low, the reaction 3 %.
 TEST_F(ForceOfATool, IsTheReactionOfTheTissue) {
   SceneView exact = scene_;
