@@ -139,12 +139,15 @@ void TissueSimulation::FindAllContacts(float h) {
   });
 }
 
-StepReport TissueSimulation::StepXpbd() {
+StepReport TissueSimulation::StepXpbd(std::uint32_t last_periods) {
   StepReport report;
   const auto substeps = static_cast<float>(scene_.physics.substeps);
   const float h = step_s() / substeps;
   // Previous positions are those of the last substep, so the movement in a step is bounded by the largest speed.
-  moved_.assign(particles_.block_count(), largest_speed_ * step_s());
+  moved_.assign(particles_.block_count(), largest_speed_ * scene_.physics.dt_s * static_cast<float>(last_periods));
+  if (last_periods != step_periods_) {
+    xpbd_->ScaleLastMove(static_cast<float>(step_periods_) / static_cast<float>(last_periods));
+  }
   FindAllContacts(h);
   float largest_sq = 0;
   for (std::uint32_t i = 0; i < scene_.physics.substeps; ++i) {
@@ -255,6 +258,7 @@ StepReport TissueSimulation::StepAccurate() {
 
 StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools, std::uint64_t periods) {
   const std::uint64_t most = scene_.physics.mode == PhysicsMode::kPaper ? 1 : kMostStepPeriods;
+  const std::uint32_t last_periods = step_periods_;
   step_periods_ = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(periods, 1, most));
   counters_.periods += step_periods_;
   ++counters_.steps;
@@ -269,7 +273,7 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools,
     return report;
   }
   ++counters_.state_version;
-  const StepReport report = implicit_ ? StepAccurate() : xpbd_ ? StepXpbd() : StepPaper();
+  const StepReport report = implicit_ ? StepAccurate() : xpbd_ ? StepXpbd(last_periods) : StepPaper();
   counters_.quarantined += report.resets;
   WatchTears(report.max_step_m);
   UpdateSleep(report, holds);

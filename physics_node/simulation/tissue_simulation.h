@@ -166,7 +166,8 @@ class TissueSimulation {
   [[nodiscard]] bool BreathingReachesTissue();
   void UpdateSleep(const StepReport& report, bool holds);
   [[nodiscard]] StepReport StepPaper();
-  [[nodiscard]] StepReport StepXpbd();
+  /// `last_periods`: length of the step before.
+  [[nodiscard]] StepReport StepXpbd(std::uint32_t last_periods);
   [[nodiscard]] int SubstepsForTools() const;
   [[nodiscard]] StepReport StepAccurate();
   void PlaceHeld(float u);

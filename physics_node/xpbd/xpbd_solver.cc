@@ -118,6 +118,13 @@ std::uint32_t XpbdSolver::Predict(float h) {
   return resets;
 }
 
+void XpbdSolver::ScaleLastMove(float ratio) {
+  for (Index p = 0; p < particles_->particle_count(); ++p) {
+    const ParticleRef at = particles_->Ref(p);
+    particles_->SetPrevious(at, particles_->At(at) - ratio * (particles_->At(at) - particles_->Previous(at)));
+  }
+}
+
 void XpbdSolver::Iterate(float h) {
   const float h_sq = h * h;
   const GridLayout& layout = particles_->layout();

@@ -27,8 +27,12 @@ class XpbdSolver {
 
   /// A substep of h seconds is Predict, Iterate, Finish; the caller places held particles and projects contacts between
   /// them. Predict: previous <- now; now <- now + damped velocity + gravity, for free particles. The last substep had
-  /// the same h. Returns the number of damaged coordinates, which are restored from the last substep.
+  /// the same h, else ScaleLastMove. Returns the number of damaged coordinates, which are restored from the last
+  /// substep.
   std::uint32_t Predict(float h);
+  /// previous <- now - ratio (now - previous): before a substep that is `ratio` times as long as the last one, so that
+  /// velocities stay.
+  void ScaleLastMove(float ratio);
   /// Organ, membrane, bending, bindings.
   void Iterate(float h);
   /// Particles that are not finite return to their previous position, movements are limited to kMaxSpeed * h.

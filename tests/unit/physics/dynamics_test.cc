@@ -45,6 +45,30 @@ TEST_P(Falling, AFreeSheetFallsAndIsDamped) {
   }
 }
 
+/// A late step simulates several periods at once, with longer substeps; velocities stay.
+TEST(FallingInXpbd, LateStepsKeepTheSpeed) {
+  constexpr Index kRows = 9;
+  scene::SceneData data = SheetScene(kRows, kRows);
+  for (float& inverse_mass : data.inverse_mass) inverse_mass = 1.0f / (0.5f * 0.002f * 0.002f);
+  SceneView scene = data.View();
+  scene.physics.mode = PhysicsMode::kXpbd;
+  scene.physics.damping_per_s = 0;
+  constexpr double kG = 1;
+  scene.physics.gravity = Vec3f(0, 0, -static_cast<float>(kG));
+  TissueSimulation simulation(scene);
+  const ParticleRef middle = simulation.particles().Ref(kRows * kRows / 2);
+  double before = 0, time_s = 0;
+  for (const std::uint64_t periods : {1, 1, 1, 1, 3, 1, 2, 3, 3, 1, 1}) {
+    (void)simulation.Step({}, periods);
+    const double z = static_cast<double>(simulation.particles().At(middle).z()),
+                 step_s = static_cast<double>(periods) * static_cast<double>(scene.physics.dt_s);
+    const double mean_time_s = time_s + 0.5 * step_s;
+    EXPECT_NEAR((before - z) / step_s, kG * mean_time_s, 0.08 * kG * mean_time_s) << "at " << time_s << " s";
+    before = z;
+    time_s += step_s;
+  }
+}
+
 // Not mode accurate, which is made for tissue that something holds (physics_node/DESIGN.md, Limits).
 INSTANTIATE_TEST_SUITE_P(Modes, Falling, testing::Values(PhysicsMode::kPaper, PhysicsMode::kXpbd));
 
