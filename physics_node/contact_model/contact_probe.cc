@@ -79,7 +79,9 @@ ContactProbe::Motion ContactProbe::MeanMotion(std::span<const Index> particles) 
   }
   const float scale = particles.empty() ? 0.0f : 1.0f / static_cast<float>(particles.size());
   mean.displacement *= scale;
-  mean.velocity *= scale / step_s_;
+  // In mode xpbd the previous positions are those of the last substep.
+  const auto substeps = static_cast<float>(scene_.physics.mode == PhysicsMode::kXpbd ? scene_.physics.substeps : 1);
+  mean.velocity *= scale * substeps / step_s_;
   return mean;
 }
 

@@ -69,6 +69,30 @@ TEST(FallingInXpbd, LateStepsKeepTheSpeed) {
   }
 }
 
+/// The velocity of the surroundings in a contact model is that of the tissue, here carried by another tool.
+TEST(SurroundingsInXpbd, MoveAtTheSpeedOfTheTissue) {
+  constexpr float kSpeed_m_s = 0.02f;
+  const scene::SceneData data = SheetScene(33, 33);
+  SceneView scene = data.View();
+  scene.physics.mode = PhysicsMode::kXpbd;
+  scene.physics.grasp_radius_m = 0.02f;  // more than the ring of nodes around a contact
+  scene.physics.grip_force_N = 1e3f;
+  TissueSimulation simulation(scene);
+  std::array<ToolInput, kMaxTools> tools{};
+  DeviceContacts device;
+  for (int i = 0; i < 40; ++i) {
+    const float lift = kSpeed_m_s * scene.physics.dt_s * static_cast<float>(std::max(i - 5, 0));
+    const Vec3f middle(0.032f, 0.032f, lift);
+    tools[0] = {true, {middle, Quatf(0, 1, 0, 0), i < 2 ? 0.8f : 0.0f}};
+    tools[1] = {true, {middle + Vec3f(0, 0, 0.005f), Quatf(0, 1, 0, 0), 0}};
+    (void)simulation.Step(tools);
+    device = simulation.Contacts(1);
+  }
+  ASSERT_TRUE(simulation.grasp(0).holding());
+  ASSERT_EQ(device.count, 1u);
+  EXPECT_NEAR(device.contacts[0].v_s.z(), kSpeed_m_s, 0.05f * kSpeed_m_s);
+}
+
 // Not mode accurate, which is made for tissue that something holds (physics_node/DESIGN.md, Limits).
 INSTANTIATE_TEST_SUITE_P(Modes, Falling, testing::Values(PhysicsMode::kPaper, PhysicsMode::kXpbd));
 
