@@ -39,10 +39,12 @@ void TouchDevice::TrackPresence(bool present, double dt) noexcept {
     const Vec3d hand_W = map_.ToWorld(sample_.p_D);
     if (!present_) {
       offset_W_ = position_W_ - hand_W;
+      roll_offset_ = roll_ - hand_roll_;
       glide_ = 1;
     }
     const double left = glide_ * glide_ * (3 - 2 * glide_);
     position_W_ = hand_W + left * offset_W_;
+    roll_ = hand_roll_ + left * roll_offset_;
     if (glide_ > 0) {
       glide_ = std::max(0.0, glide_ - dt / kTouchGlide_s);
       presence_ = std::max(0.0, presence_ - dt / kTouchFade_s);
@@ -60,7 +62,7 @@ void TouchDevice::TrackRoll() noexcept {
   const Vec3d level = Vec3d::UnitX() - d.x() * d;
   const double angle = std::atan2(d.dot(level.cross(sample_.x_D)), level.dot(sample_.x_D));
   if (level.norm() < kLeastSine || !std::isfinite(angle)) return;
-  roll_ += std::remainder(angle - roll_, 2 * std::numbers::pi);
+  hand_roll_ += std::remainder(angle - hand_roll_, 2 * std::numbers::pi);
 }
 
 void TouchDevice::TrackHeat(double dt) noexcept {

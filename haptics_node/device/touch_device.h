@@ -12,7 +12,8 @@
 namespace fulcrum::haptics {
 
 /// A device without a reading for kTouchStale_s is lost: its force fades within kTouchFade_s, the tool keeps its place.
-/// After reconnection the tool glides to the hand within kTouchGlide_s, then the force rises within kTouchRise_s.
+/// After reconnection the tool glides and turns to the hand within kTouchGlide_s, then the force rises within
+/// kTouchRise_s.
 inline constexpr double kTouchStale_s = 0.02, kTouchFade_s = 0.3, kTouchGlide_s = 0.5, kTouchRise_s = 0.25;
 /// Range of the hottest motor's heat over which the force is reduced from full to 0 (at 1 the driver cuts the force).
 /// Forces below the device's continuous limit do not reach it.
@@ -54,7 +55,8 @@ class TouchDevice final : public HapticDevice {
   Vec3d offset_W_ = Vec3d::Zero();  ///< From the hand to the tool at the time of reconnection [m].
   double glide_ = 0;                ///< Remaining fraction of the offset, before smoothing, 1 … 0.
   double presence_ = 0, coolness_ = 1;
-  double roll_ = 0;  ///< [rad]
+  double roll_ = 0;                         ///< Of the tool [rad].
+  double hand_roll_ = 0, roll_offset_ = 0;  ///< Of the stylus, and from it to the tool as offset_W_ [rad].
   std::atomic<double> gain_{0};
 };
 

@@ -403,5 +403,23 @@ TEST_F(Touch, ButtonsAndTheTurnOfTheStylusArrive) {
   EXPECT_NEAR(devices[0]->ReadRoll() - before, 1.5 * std::numbers::pi, 0.01) << "and does not turn the tool";
 }
 
+TEST_F(Touch, AStylusThatWasTurnedWhileItWasLostTurnsTheToolSlowly) {
+  Open(kLeft);
+  Run(600);
+  for (int i = 0; i < 30; ++i) (void)devices[0]->ReadPosition(TickAt(millisecond++));  // The driver is held up.
+  const float before = devices[0]->ReadRoll();
+  auto& transform = rig.hd->devices[0].transform;
+  transform[0] = transform[5] = 0;
+  transform[1] = -1;
+  transform[4] = 1;
+  float last = before;
+  for (int i = 0; i < 700; ++i) {
+    Run(1);
+    ASSERT_LT(std::abs(devices[0]->ReadRoll() - last), 0.02f) << i << " ms";
+    last = devices[0]->ReadRoll();
+  }
+  EXPECT_NEAR(std::abs(last - before), 0.5 * std::numbers::pi, 0.01);
+}
+
 }  // namespace
 }  // namespace fulcrum::haptics
