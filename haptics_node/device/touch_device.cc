@@ -83,6 +83,11 @@ DeviceHealth TouchDevice::Describe() const {
   health.motor_heat = driver_->link(tool_).motor_heat.load(std::memory_order_relaxed);
   health.gain = gain_.load(std::memory_order_relaxed);
   health.trouble = driver_->Trouble(tool_);
+  const std::string serial = driver_->serial(tool_);  // Empty until the device is there.
+  if (health.trouble.empty() && !trocar_device_.empty() && !serial.empty() && serial != trocar_device_) {
+    health.trouble = "Touch " + serial + " works with a trocar that was measured with device " + trocar_device_ +
+                     ": stop, and calibrate the trocar again";
+  }
   if (health.trouble.empty() && health.motor_heat > kMotorWarm) {
     health.trouble = "Touch " + driver_->serial(tool_) + " has warm motors: its force is faded; let the hand rest";
   }

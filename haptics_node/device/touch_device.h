@@ -4,6 +4,8 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <string>
+#include <utility>
 
 #include "haptics_node/device/haptic_device.h"
 #include "haptics_node/device/touch_driver.h"
@@ -36,6 +38,9 @@ class TouchDevice final : public HapticDevice {
   }
   void WriteForce(const Vec3d& f_W) noexcept override;
   [[nodiscard]] DeviceHealth Describe() const override;
+  /// Serial number of the device with which the trocar of the map was measured; another one is a trouble of Describe().
+  /// Empty: not measured.
+  void set_trocar_device(std::string serial) { trocar_device_ = std::move(serial); }
 
  private:
   void TrackPresence(bool present, double dt) noexcept;
@@ -46,6 +51,7 @@ class TouchDevice final : public HapticDevice {
   std::size_t tool_;
   WorkspaceMap map_;
   double force_scale_;
+  std::string trocar_device_;
 
   // Servo thread.
   TouchSample sample_;

@@ -32,8 +32,10 @@ HandModel HandOf(HandHold hold, const HapticsParams& scene) {
 }
 
 /// @param serial serial number of the connected device; empty if unknown or simulated.
+/// @param measured_with set to the serial number with which the stored trocar was measured, if that is used.
 WorkspaceMap MapOf(const config::CartConfig& cart, std::size_t tool, const Vec3d& p_WP, const std::string& serial,
-                   const std::filesystem::path& trocars, std::vector<std::string>* notes) {
+                   const std::filesystem::path& trocars, std::vector<std::string>* notes,
+                   std::string* measured_with = nullptr) {
   const config::WorkspaceConfig& workspace = cart.devices[tool].workspace;
   WorkspaceMap map{RotationFromAngles(workspace.rotation_rad), workspace.scale, workspace.trocar_D, p_WP};
   const std::filesystem::path file = TrocarFile(trocars, cart.name, tool);
@@ -41,6 +43,7 @@ WorkspaceMap MapOf(const config::CartConfig& cart, std::size_t tool, const Vec3d
   if (const auto stored = LoadTrocar(file)) {
     if (serial.empty() || stored->serial == serial) {
       map.p_DP = stored->p_DP;
+      if (measured_with != nullptr) *measured_with = stored->serial;
       notes->push_back(prefix + "trocar as measured, " + file.string());
     } else {
       notes->push_back(prefix + "the trocar of the cart file is used: " + file.string() + " was measured with device " +
@@ -131,9 +134,13 @@ CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& sce
       case DeviceKind::kTouch: {
         const std::string found = driver->serial(i), trouble = driver->Trouble(i);
         const std::string& serial = found.empty() ? device.serial : found;
-        const WorkspaceMap map = MapOf(cart, i, trocar.p_WP, serial, trocars, &made.notes);
+        std::string measured_with;
+        const WorkspaceMap map = MapOf(cart, i, trocar.p_WP, serial, trocars, &made.notes, &measured_with);
         made.notes.push_back("tool " + std::to_string(i) + ": " + (trouble.empty() ? "Touch " + serial : trouble));
-        made.devices[i] = std::make_unique<TouchDevice>(driver, i, map, device.force_scale, RestOf(scene, i));
+        auto touch = std::make_unique<TouchDevice>(driver, i, map, device.force_scale, RestOf(scene, i));
+        // A device that is connected later tells its number only then.
+        touch->set_trocar_device(measured_with);
+        made.devices[i] = std::move(touch);
         break;
       }
     }

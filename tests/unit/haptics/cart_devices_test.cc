@@ -5,10 +5,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include "haptics_node/device/hand_model.h"
 #include "haptics_node/node/calibrate_trocar.h"
@@ -200,6 +202,26 @@ TEST_F(CartDevicesTest, ATrocarThatAnotherTouchMeasuredIsNotUsed) {
   SaveTrocar(TrocarFile(folder, cart.name, 0), "B200", fit);
   EXPECT_NE(Make().notes[0].find("measured with device B200, this is A100; calibrate the trocar again"),
             std::string::npos);
+}
+
+/// A device that was not there at the start has no serial number before it is connected.
+TEST_F(CartDevicesTest, ATrocarThatAnotherTouchMeasuredIsAFaultOfADeviceThatComesLate) {
+  for (const bool fits : {false, true}) {
+    TouchRig rig;
+    UseTouch("Left Device");
+    SaveTrocar(TrocarFile(folder, cart.name, 0), fits ? "A100" : "B200", FitPivot(Swing(kPivot, 0.3, 0.001)));
+    rig.hd->devices[0].plugged = false;
+    const CartDevices made = Make();
+    rig.hd->devices[0].plugged = true;
+    made.touch->Start();
+    std::string trouble = "waits";
+    for (int i = 0; i < 600 && (trouble == "waits" || trouble.find("cannot open") != std::string::npos); ++i) {
+      rig.Tick();
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      trouble = made.devices[0]->Describe().trouble;
+    }
+    EXPECT_EQ(trouble.find("measured with device B200") != std::string::npos, !fits) << trouble;
+  }
 }
 
 TEST_F(CartDevicesTest, ADamagedTrocarFileIsRefused) {
