@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
 #include "services/apps/replayer/render_replay.h"
 
@@ -33,6 +35,14 @@ PicturesResult ReplayPictures(const PicturesSettings& settings, const SceneView&
   node.WaitForFiles();
   Health health;
   node.FillHealth(&health);
+  double missing = 0;
+  for (const Metric& metric : health.metrics) {
+    if (metric.name == "png_failed" || metric.name == "png_dropped") missing += metric.value;
+  }
+  if (missing > 0) {
+    throw std::runtime_error(std::to_string(static_cast<std::uint64_t>(missing)) + " pictures were not written to " +
+                             settings.frames.string() + "; the last error: " + health.last_error);
+  }
   return {node.pictures_written(), health.metrics};
 }
 

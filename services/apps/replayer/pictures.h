@@ -24,7 +24,7 @@ struct PicturesResult {
 
 /// Draws the recorded topics with the class of render_node at the scene's rate of pictures, on the clock of the
 /// recording and at high quality, so that all runs give the same pictures. Throws InputError, MismatchError, and
-/// std::runtime_error when OpenGL is missing.
+/// std::runtime_error when OpenGL is missing or a picture could not be written.
 PicturesResult ReplayPictures(const PicturesSettings& settings, const SceneView& scene,
                               const std::function<void(double)>& progress);
 

@@ -403,7 +403,7 @@ TEST(IntoRender, ASampleThatNoNodeTakesChangesNoPicture) {
   EXPECT_TRUE(Drawn(spoilt, "frames") == pictures);
 }
 
-TEST(IntoRender, DrawsTheSamePicturesToTheLastByte) {
+TEST(IntoRender, DrawsTheSamePicturesToTheLastByteOrFails) {
   const testing::ShortSession session("pictures_test", {.seconds = 1.6}, FourPicturesASecond);
   const auto first = Drawn(session, "first"), second = Drawn(session, "second");
   ASSERT_GE(first.size(), 5u);
@@ -416,6 +416,16 @@ TEST(IntoRender, DrawsTheSamePicturesToTheLastByte) {
   }
   EXPECT_EQ(second.size(), first.size());
   EXPECT_EQ(different.size(), first.size()) << "the tools move from picture to picture";
+
+  // A picture that cannot be written, here as a folder has its name.
+  const std::filesystem::path frames = session.folder() / "third";
+  std::filesystem::create_directories(frames / first.begin()->first);
+  fulcrum::testing::Program replayer("replayer", {session.recording(), "--into", "render", "--frames", frames});
+  std::optional<int> code;
+  fulcrum::testing::WaitFor(kPicturePatience_s, [&] { return (code = replayer.Poll()).has_value(); });
+  EXPECT_EQ(code, 1);
+  EXPECT_NE(replayer.Said().find(" pictures were not written to " + frames.string()), std::string::npos)
+      << replayer.Said();
 }
 
 }  // namespace
