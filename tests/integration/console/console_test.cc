@@ -194,8 +194,9 @@ TEST_F(ConsoleTest, ASessionOutlivesItsConsoleAndIsFoundAgain) {
 TEST_F(ConsoleTest, TheLivePictureReturnsAfterTheConsoleHadNoDescriptorsForAWhile) {
   ConsoleProgram console(kDomain, out(), Token());
   EXPECT_EQ(console.Post("/api/start", "scene=small&seconds=60&record=off").status, 200);
-  ASSERT_TRUE(WaitFor(60, [&] { return Says(console, {"\"phase\":\"running\""}); }))
-      << ReadFile(out() + "/console.log");
+  ASSERT_TRUE(WaitFor(60, [&] {
+    return Says(console, {"\"phase\":\"running\"", "\"picture\":\"frame_"});
+  })) << ReadFile(out() + "/console.log");
   const std::string ticket = Between(console.Post("/api/ticket").body, "\"text\":\"", "\"");
   const std::string host = "127.0.0.1:" + std::to_string(console.port());
   HttpConnection page(console.port());

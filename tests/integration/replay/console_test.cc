@@ -1,5 +1,6 @@
 // The replayer's console as a program: its commands through a pipe.
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <pty.h>
 #include <signal.h>
 #include <stdlib.h>
@@ -48,10 +49,16 @@ class Typed {
     EXPECT_EQ(::write(terminal_, keys.data(), keys.size()), static_cast<ssize_t>(keys.size()));
   }
   [[nodiscard]] pid_t pid() const { return pid_; }
-  /// Exit code, or minus the signal; what it printed is in `said`.
+  /// Exit code, or minus the signal; what it printed is in `said`. A replay that is silent for long is ended.
   int End(std::string* said) {
+    constexpr int kLongestSilence_ms = 20'000;
     std::array<char, 1024> part{};
-    for (ssize_t n = 0; (n = ::read(terminal_, part.data(), part.size())) > 0;) {
+    for (;;) {
+      pollfd printed{terminal_, POLLIN, 0};
+      const bool silent = ::poll(&printed, 1, kLongestSilence_ms) == 0;
+      const ssize_t n = silent ? 0 : ::read(terminal_, part.data(), part.size());
+      if (silent) ::kill(pid_, SIGKILL);
+      if (n <= 0) break;
       said->append(part.data(), static_cast<std::size_t>(n));
     }
     int status = 0;
