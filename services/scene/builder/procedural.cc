@@ -18,8 +18,8 @@ constexpr double kFlareSlope_rad = 0.14;
 constexpr double kFlareLength_m = 0.008;
 constexpr double kUndulation_m = 0.0003;  ///< Irregularity of sheet and surface, as in nature.
 
-/// Drawn vertices per tube vertex along each direction. With 24 segments a chord is 0.04 mm off its arc: 0.4 pixels of a
-/// picture of 1080 lines. Four draw the same picture (54 dB) for a tenth more time.
+/// Drawn vertices per tube vertex along each direction. With 24 segments a chord is 0.04 mm off its arc: 0.4 pixels of
+/// a picture of 1080 lines. Four draw the same picture (54 dB) for a tenth more time.
 constexpr int kSurfaceRefinement = 2;
 
 /// Geometry of the scene: the curved centre line and the surfaces around it, as functions of u in [0, 1] along the
