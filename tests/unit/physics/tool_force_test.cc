@@ -162,17 +162,17 @@ TEST_F(ForceOfATool, KeepsItsStiffnessAsleepWhileAnotherToolMoves) {
   ASSERT_LT(simulation.awake_part(), 0.02f);
   ASSERT_EQ(device.count, 1u);
   const Contact still = device.contacts[0];
-  float moved = 0;
-  for (int i = 0; i < 200; ++i) {
-    const float depth = 0.003f * (1 - std::cos(0.1f * static_cast<float>(i)));
+  // Until more than a third of the tissue is awake: then all of it is computed.
+  int steps = 0;
+  for (; steps < 100 && simulation.awake_part() < implicit::Regions::kLargestAwakePart; ++steps) {
+    ASSERT_EQ(device.count, 1u);
+    ASSERT_EQ(device.contacts[0].k_body, still.k_body) << "step " << steps;
+    ASSERT_EQ(device.contacts[0].b_body, still.b_body) << "step " << steps;
+    const float depth = 0.003f * (1 - std::cos(0.1f * static_cast<float>(steps)));
     tools[1] = {true, PoseAtTip(scene_.tools[1], node(40) + Vec3f(0, 0, 0.003f - depth), 0)};
     step(3.0f);
-    ASSERT_EQ(device.count, 1u);
-    ASSERT_NEAR(device.contacts[0].k_body, still.k_body, 0.02f * still.k_body) << "step " << i;
-    ASSERT_NEAR(device.contacts[0].b_body, still.b_body, 0.02f * still.b_body) << "step " << i;
-    moved = std::max(moved, simulation.collision().force(1).norm());
   }
-  EXPECT_GT(moved, 0.1f);
+  EXPECT_GT(steps, 4) << "a query of the still tool is among them";
 }
 
 /// Two iterations leave the contacts ahead of the tissue: the sum of their forces is 13 % too low, the reaction 3 %.
