@@ -96,8 +96,8 @@ void AddDatabase(boost::program_options::options_description* options);
 
 /// True when standard output is a pipe or socket whose other end is closed.
 [[nodiscard]] bool ReaderIsGone();
-/// True when nobody reads standard output any more, or it could not be written. SIGPIPE is ignored, so a command that
-/// prints without end asks for it.
+/// True when nobody reads standard output any more, or it could not be written: the end of a loop that prints, since
+/// SIGPIPE is ignored.
 [[nodiscard]] bool OutputHasEnded();
 
 /// Sends a command to the supervisor of the domain and prints its reply. Throws InputError when none runs there.
