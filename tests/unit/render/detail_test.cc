@@ -39,6 +39,14 @@ class DetailTest : public testing::Test {
     return runs;
   }
 
+  [[nodiscard]] TopologyState CutInTheMiddle() const {
+    TopologyState topology = WholeTopology(view_);
+    const Index node = view_.membrane.rows / 2 * view_.membrane.cols + view_.membrane.cols / 2;
+    SetBit(topology.dead_edges, 3 * std::size_t{node});
+    SetBit(topology.dead_edges, 3 * std::size_t{node} + 2);
+    return topology;
+  }
+
   /// The block of the grid that contains a triangle.
   static std::size_t BlockOf(const MembraneMesh& mesh, const Triangle& t, Index cols) {
     Index row = t[0] / cols, col = t[0] % cols;
@@ -157,12 +165,8 @@ TEST_F(DetailTest, TheSheetStaysWatertightWhereItsDetailVaries) {
 }
 
 TEST_F(DetailTest, ACutIsDrawnAsFinelyAsItIs) {
-  TopologyState topology = WholeTopology(view_);
-  const Index node = view_.membrane.rows / 2 * view_.membrane.cols + view_.membrane.cols / 2;
-  SetBit(topology.dead_edges, 3 * std::size_t{node});
-  SetBit(topology.dead_edges, 3 * std::size_t{node} + 2);
   MembraneMesh mesh(view_);
-  ASSERT_TRUE(mesh.SetTopology(topology));
+  ASSERT_TRUE(mesh.SetTopology(CutInTheMiddle()));
   mesh.Update(xyz_);
   const std::vector<Triangle> chosen = Choose(mesh);
   for (std::size_t block = 0; block < std::size_t{mesh.block_rows()} * mesh.block_cols(); ++block) {
@@ -178,12 +182,8 @@ TEST_F(DetailTest, ACutIsDrawnAsFinelyAsItIs) {
 }
 
 TEST_F(DetailTest, UntouchedBlocksHaveRunsOfTheirOwnAndRowsStayInTheirOrder) {
-  TopologyState topology = WholeTopology(view_);
-  const Index node = view_.membrane.rows / 2 * view_.membrane.cols + view_.membrane.cols / 2;
-  SetBit(topology.dead_edges, 3 * std::size_t{node});
-  SetBit(topology.dead_edges, 3 * std::size_t{node} + 2);
   MembraneMesh mesh(view_);
-  ASSERT_TRUE(mesh.SetTopology(topology));
+  ASSERT_TRUE(mesh.SetTopology(CutInTheMiddle()));
   mesh.Update(xyz_);
   std::vector<Triangle> all = Choose(mesh);
   std::ranges::sort(all);
