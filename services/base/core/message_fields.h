@@ -37,6 +37,8 @@ namespace fulcrum {
   F(cut_width_m) F(cut_off_way_m) F(dead_nodes) F(dead_edges) F(shrink)
 #define FULCRUM_FIELDS_OF_TearState(F) F(stamp) F(scene_hash) F(rows) F(cols) F(torn_edges)
 #define FULCRUM_FIELDS_OF_OpenCells(F) F(stamp) F(scene_hash) F(x) F(y) F(rows)
+#define FULCRUM_FIELDS_OF_Clip(F) F(p_AC) F(q_AC) F(anchors) F(length_m) F(tool)
+#define FULCRUM_FIELDS_OF_ClipState(F) F(stamp) F(scene_hash) F(count) F(clips)
 #define FULCRUM_FIELDS_OF_TemperaturePatchHeader(F) F(stamp) F(topology_revision) F(slot) F(surface) F(origin_x) F(origin_y) \
   F(max_temperature_C)
 #define FULCRUM_FIELDS_OF_TemperaturePatch(F) F(header) F(texels)
@@ -59,7 +61,7 @@ namespace fulcrum {
 #define FULCRUM_STRUCTS_ALIKE_IN_IDL(S) S(HandleSample) S(HandleState) S(GeneratorSetting) S(OperatorTool) \
   S(OperatorInput) S(ToolSample) \
   S(ToolState) S(TissueFrameHeader) S(Contact) S(DeviceContacts) S(ContactModel) S(Footprint) S(CauteryContact) \
-  S(TopologyState) S(TearState) S(OpenCells) S(TemperaturePatchHeader) S(PictureHeader) S(ThermalEvent) S(SceneManifest) \
+  S(TopologyState) S(TearState) S(OpenCells) S(Clip) S(ClipState) S(TemperaturePatchHeader) S(PictureHeader) S(ThermalEvent) S(SceneManifest) \
   S(TickManifest) S(TimingSummary) S(InputHealth) S(Metric) S(Health)
 /// The others: `sequence` is a keyword of IDL, and the three large messages are sent in loans.
 #define FULCRUM_STRUCTS_WITH_A_CONVERSION_OF_THEIR_OWN(S) S(Stamp) S(ConsumedInput) S(TissueFrame) \

@@ -99,7 +99,7 @@ struct OperatorInput {
 
 /// The jaw of a scope is the zoom ring of its camera head: 0 wide (services/base/core/scope.h). That of a suction and
 /// irrigation tube is its trumpet valve (services/base/core/suction.h).
-enum class ToolKind : std::uint8_t { kNone, kGrasper, kHook, kScissors, kScope, kSuction };
+enum class ToolKind : std::uint8_t { kNone, kGrasper, kHook, kScissors, kScope, kSuction, kClipApplier };
 /// A scope is held clear of the tissue: nothing collides with it.
 constexpr bool TouchesTissue(ToolKind kind) { return kind != ToolKind::kNone && kind != ToolKind::kScope; }
 
@@ -260,6 +260,27 @@ struct OpenCells {
   }
 };
 
+// ------------------------------------------------------------------------------------------------ ClipState
+
+inline constexpr int kMaxClips = 16;  ///< Clips in a session.
+
+/// A clip on the tissue, placed relative to three of its vertices: services/base/core/clips.h.
+struct Clip {
+  Vec3f p_AC = Vec3f::Zero();  ///< Middle of the clip [m].
+  Quatf q_AC = Quatf::Identity();
+  std::array<std::uint32_t, 3> anchors{0, 1, 2};  ///< Vertices of the tissue in the order of TissueFrame.
+  float length_m = 0;                             ///< Along z of C.
+  std::uint8_t tool = 0;                          ///< That applied it.
+};
+
+/// All clips on the tissue, in the order in which they were applied.
+struct ClipState {
+  Stamp stamp;
+  std::uint64_t scene_hash = 0;
+  std::uint32_t count = 0;
+  std::array<Clip, kMaxClips> clips;
+};
+
 inline bool TestBit(std::span<const std::uint8_t> bits, std::size_t i) { return (bits[i >> 3] >> (i & 7u)) & 1u; }
 inline void SetBit(std::span<std::uint8_t> bits, std::size_t i) {
   bits[i >> 3] = static_cast<std::uint8_t>(bits[i >> 3] | (1u << (i & 7u)));
@@ -381,7 +402,8 @@ struct SceneManifest {
 #define FULCRUM_MESSAGES(M) \
   M(HandleState) M(ToolState) M(TissueFrame) M(ContactModel) M(CauteryContact) M(TopologyState) \
   M(TemperaturePatch) M(ThermalEvent) M(SceneManifest) M(TickManifest) \
-  M(Health) M(TearState) M(OpenCells) M(GeneratorSetting) M(OperatorInput) M(Picture)
+  M(Health) M(TearState) M(OpenCells) M(GeneratorSetting) M(OperatorInput) M(Picture) \
+  M(ClipState)
 // clang-format on
 
 #define FULCRUM_TOPIC_ID(T) k##T,

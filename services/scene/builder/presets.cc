@@ -53,6 +53,8 @@ ToolDescription DefaultTool(ToolKind kind, const Vec3f& p_WP) {
       return {kind, p_WP, 0.005f, 0.330f, 0.005f, 0.005f};
     case ToolKind::kSuction:
       return {kind, p_WP, 0.0025f, 0.330f, 0.0025f, 0.018f};
+    case ToolKind::kClipApplier:
+      return {kind, p_WP, 0.0025f, 0.330f, 0.0010f, 0.008f};
     case ToolKind::kNone:
       break;
   }

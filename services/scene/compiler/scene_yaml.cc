@@ -27,9 +27,13 @@ constexpr std::size_t kMaxKeys = 2000;
 constexpr std::size_t kMaxStructures = 64;
 constexpr std::size_t kMaxPathPoints = 64;
 
-const StrictMap::Choices<ToolKind> kToolKinds = {{"none", ToolKind::kNone},   {"grasper", ToolKind::kGrasper},
-                                                 {"hook", ToolKind::kHook},   {"scissors", ToolKind::kScissors},
-                                                 {"scope", ToolKind::kScope}, {"suction", ToolKind::kSuction}};
+const StrictMap::Choices<ToolKind> kToolKinds = {{"none", ToolKind::kNone},
+                                                 {"grasper", ToolKind::kGrasper},
+                                                 {"hook", ToolKind::kHook},
+                                                 {"scissors", ToolKind::kScissors},
+                                                 {"scope", ToolKind::kScope},
+                                                 {"suction", ToolKind::kSuction},
+                                                 {"clip_applier", ToolKind::kClipApplier}};
 const StrictMap::Choices<ProtectedKind> kProtectedKinds = {{"ureter", ProtectedKind::kUreter},
                                                            {"nerve", ProtectedKind::kNerve}};
 const StrictMap::Choices<std::uint32_t> kPedals = {

@@ -143,7 +143,7 @@ void CheckParameters(const SceneView& s) {
   CheckPoint("scene", 1, r.scope_target_W);
   for (std::size_t i = 0; i < s.tools.size(); ++i) {
     const ToolDescription& tool = s.tools[i];
-    if (tool.kind > ToolKind::kSuction) {
+    if (tool.kind > ToolKind::kClipApplier) {
       Fail("scene", "tool ", i, ": unknown kind ", static_cast<int>(tool.kind));
     }
     CheckPoint("scene", i, tool.p_WP);

@@ -26,6 +26,8 @@ const char* NameOf(ToolKind kind) {
       return "Scope";
     case ToolKind::kSuction:
       return "Suction tube";
+    case ToolKind::kClipApplier:
+      return "Clip applier";
     default:
       return "Instrument";
   }

@@ -46,9 +46,17 @@ bool AllWithin(std::span<const float> values, float limit) {
 }
 
 bool IsTool(const ToolSample& t) {
-  return UpTo(t.kind, ToolKind::kSuction) && UpTo(t.state, ServoState::kRise) && Magnitude(t.p_WT, kMaxCoordinate_m) &&
-         IsUnit(t.q_WT) && Magnitude(t.v_WT, kMaxSpeed_m_s) && Magnitude(t.w_WT, kMaxTurnRate_rad_s) &&
-         Magnitude(t.f_W, kMaxForce_N) && Within(t.model_age_s, 0.0, 1e9);
+  return UpTo(t.kind, ToolKind::kClipApplier) && UpTo(t.state, ServoState::kRise) &&
+         Magnitude(t.p_WT, kMaxCoordinate_m) && IsUnit(t.q_WT) && Magnitude(t.v_WT, kMaxSpeed_m_s) &&
+         Magnitude(t.w_WT, kMaxTurnRate_rad_s) && Magnitude(t.f_W, kMaxForce_N) && Within(t.model_age_s, 0.0, 1e9);
+}
+
+bool IsClip(const Clip& c) {
+  constexpr float kLongestClip_m = 0.1f;
+  const auto& a = c.anchors;
+  return Magnitude(c.p_AC, kMaxCoordinate_m) && IsUnit(c.q_AC) && Within(c.length_m, 0.0, kLongestClip_m) &&
+         c.tool < kMaxTools && a[0] != a[1] && a[1] != a[2] && a[2] != a[0] &&
+         std::all_of(a.begin(), a.end(), [](std::uint32_t vertex) { return vertex < kMaxTissueVertices; });
 }
 
 bool IsContact(const Contact& c) {
@@ -142,6 +150,10 @@ bool PassesGate(const TearState& m) noexcept {
 }
 
 bool PassesGate(const OpenCells& m) noexcept { return IsStamp(m.stamp) && Magnitude(m.x, 1e8) && Magnitude(m.y, 1e8); }
+
+bool PassesGate(const ClipState& m) noexcept {
+  return IsStamp(m.stamp) && m.count <= kMaxClips && std::all_of(m.clips.begin(), m.clips.begin() + m.count, IsClip);
+}
 
 bool PassesGate(const TemperaturePatch& m) noexcept {
   const TemperaturePatchHeader& h = m.header;

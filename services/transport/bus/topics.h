@@ -120,6 +120,12 @@ inline constexpr Quality kQualityOf<OpenCells>{.delivery = Delivery::kReliable,
                                                .writer_depth = kLatestOnly,
                                                .reader_depth = kFrameRing};
 template <>
+inline constexpr Quality kQualityOf<ClipState>{.delivery = Delivery::kReliable,
+                                               .late_joiners_served = true,
+                                               .gap_is_loss = false,
+                                               .writer_depth = kLatestOnly,
+                                               .reader_depth = kFrameRing};
+template <>
 inline constexpr Quality kQualityOf<GeneratorSetting>{.delivery = Delivery::kReliable,
                                                       .late_joiners_served = true,
                                                       .gap_is_loss = false,

@@ -14,9 +14,9 @@ namespace fulcrum::link {
 /// link that reads them would make render_node compress all the time, and they would fill a slow cable.
 inline constexpr bus::TopicSet kTravels =
     bus::SetOf(TopicId::kHandleState, TopicId::kToolState, TopicId::kTissueFrame, TopicId::kContactModel,
-               TopicId::kCauteryContact, TopicId::kTearState, TopicId::kOpenCells, TopicId::kTopologyState,
-               TopicId::kTemperaturePatch, TopicId::kThermalEvent, TopicId::kSceneManifest, TopicId::kGeneratorSetting,
-               TopicId::kOperatorInput, TopicId::kTickManifest, TopicId::kHealth);
+               TopicId::kCauteryContact, TopicId::kTearState, TopicId::kClipState, TopicId::kOpenCells,
+               TopicId::kTopologyState, TopicId::kTemperaturePatch, TopicId::kThermalEvent, TopicId::kSceneManifest,
+               TopicId::kGeneratorSetting, TopicId::kOperatorInput, TopicId::kTickManifest, TopicId::kHealth);
 
 /// The side of the link on which a rule is applied.
 struct Side {

@@ -219,6 +219,17 @@ TEST(GateRanges, OpenCells) {
                             {"before all sheets", [](auto& m) { m.y = -200'000'000; }}});
 }
 
+TEST(GateRanges, ClipState) {
+  ExpectRefused<ClipState>({{"more than there can be", [](auto& m) { m.count = kMaxClips + 1; }},
+                            {"longer than any", [](auto& m) { m.clips[0].length_m = 0.11f; }},
+                            {"negative length", [](auto& m) { m.clips[1].length_m = -1e-3f; }},
+                            {"no rotation", [](auto& m) { m.clips[2].q_AC.coeffs().setZero(); }},
+                            {"beyond all scenes", [](auto& m) { m.clips[3].p_AC.x() = 11; }},
+                            {"two anchors for three", [](auto& m) { m.clips[4].anchors[2] = m.clips[4].anchors[0]; }},
+                            {"vertex beyond capacity", [](auto& m) { m.clips[5].anchors[1] = kMaxTissueVertices; }},
+                            {"unknown tool", [](auto& m) { m.clips[6].tool = kMaxTools; }}});
+}
+
 TEST(GateRanges, TemperaturePatch) {
   ExpectRefused<TemperaturePatch>({{"reaches beyond the atlas", [](auto& m) { m.header.origin_x = 3841; }},
                                    {"reaches beyond the atlas", [](auto& m) { m.header.origin_y = 3841; }},

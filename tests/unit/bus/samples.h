@@ -190,6 +190,22 @@ inline OpenCells Sample(std::uint64_t sequence) {
 }
 
 template <>
+inline ClipState Sample(std::uint64_t sequence) {
+  ClipState m;
+  m.stamp = {sequence, 16, 6700};
+  m.scene_hash = 0xabcdef;
+  m.count = kMaxClips;
+  for (std::uint32_t i = 0; i < m.count; ++i) {
+    m.clips[i] = {{0.001f * static_cast<float>(i), -0.002f, 0.003f},
+                  {0.5f, -0.5f, 0.5f, -0.5f},
+                  {7 * i, 7 * i + 3, 7 * i + 2},
+                  0.006f + 1e-4f * static_cast<float>(i),
+                  static_cast<std::uint8_t>(i % kMaxTools)};
+  }
+  return m;
+}
+
+template <>
 inline TemperaturePatch Sample(std::uint64_t sequence) {
   TemperaturePatch m;
   m.header = {{sequence, 17, 7000}, 8, 3, BurntSurface::kSolids, 128, 3840, 101.5f};

@@ -11,7 +11,7 @@ static_assert(idl::MAX_TOOLS == kMaxTools && idl::MAX_CONTACTS == kMaxContacts &
 static_assert(idl::PEDAL_CUT == kPedalCut && idl::PEDAL_COAG == kPedalCoag && idl::PEDAL_BLEND == kPedalBlend);
 static_assert(idl::OPERATOR_PROGRAM == static_cast<int>(OperatorSource::kProgram) &&
               idl::OPERATOR_BROWSER == static_cast<int>(OperatorSource::kBrowser));
-static_assert(idl::TOOL_SUCTION == static_cast<int>(ToolKind::kSuction));
+static_assert(idl::TOOL_CLIP_APPLIER == static_cast<int>(ToolKind::kClipApplier) && idl::MAX_CLIPS == kMaxClips);
 static_assert(idl::SERVO_RISE == static_cast<int>(ServoState::kRise));
 static_assert(idl::CONTACT_GRASP == static_cast<int>(ContactKind::kGrasp));
 static_assert(idl::MAX_FOOTPRINT == kFootprintCells * kFootprintCells && idl::OPEN_WINDOW == kOpenWindow);
