@@ -22,8 +22,8 @@ function make(tag, className, text) {
 
 // ------------------------------------------------------------------------------------------------ requests
 
-async function call(path, fields) {
-  const options = {headers: {Authorization: `Bearer ${token}`}};
+async function call(path, fields, signal) {
+  const options = {headers: {Authorization: `Bearer ${token}`}, signal};
   if (fields) {
     options.method = 'POST';
     options.body = new URLSearchParams(fields);
@@ -70,19 +70,32 @@ $('token-form').addEventListener('submit', () => {
   location.reload();
 });
 
+const kSilence = 3000;  // ms: the console sends five states a second.
 let points = [];
 async function listen() {
   for (;;) {
+    // A network that is gone does not end a connection by itself.
+    const gone = new AbortController();
+    let silence = 0, why = 'No response from the console. If this message stays, start it again: fulcrum console';
+    const heard = () => {
+      clearTimeout(silence);
+      silence = setTimeout(() => gone.abort(), kSilence);
+    };
     try {
-      const response = await call('/api/events');
+      heard();
+      const response = await call('/api/events', undefined, gone.signal);
       if (response.status === 401) return;
-      if (!response.ok) throw new Error((await response.json().catch(() => ({}))).text || `answer ${response.status}`);
+      if (!response.ok) {
+        why = (await response.json().catch(() => ({}))).text || why;
+        throw new Error(why);
+      }
       $('banner').hidden = true;
       points = [];
       const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
       for (let text = '';;) {
         const {value, done} = await reader.read();
         if (done) break;
+        heard();
         text += value;
         const parts = text.split('\n\n');
         text = parts.pop();
@@ -91,10 +104,16 @@ async function listen() {
         for (const state of states) takePoints(state);
         if (states.length) show(states[states.length - 1]);
       }
-    } catch (error) { /* The banner below reports it. */ }
-    $('banner').textContent = 'No response from the console. If this message stays, start it again: fulcrum console';
+    } catch (error) { /* The banner below reports it. */ } finally {
+      clearTimeout(silence);
+      gone.abort();
+    }
+    $('banner').textContent = why;
     $('banner').hidden = false;
     document.body.dataset.phase = 'unknown';
+    // The next connection starts from nothing: perhaps to another console, which counts its notices from 1.
+    state = {phase: 'unknown'};
+    noticed = -1;
     setStatus('off', 'No connection', '');
     await new Promise(done => setTimeout(done, 1000));
   }
@@ -211,37 +230,8 @@ function showWarnings(warnings) {
   if (!warnings.length) $('warning-list').append(make('li', 'none', 'None'));
 }
 
-// The generator's knobs: the setting that the supervisor reports, and buttons for a step up or down.
-const knobs = new Map();
-function makeKnob(name, label) {
-  const term = make('dt', '', label), item = make('dd', 'stepper'), value = make('output');
-  const step = watts => {
-    const button = make('button', '', watts < 0 ? '\u2212' : '+');
-    Object.assign(button, {type: 'button', id: `${name}-${watts < 0 ? 'less' : 'more'}`});
-    button.setAttribute('aria-label', `${label}: 5 watts ${watts < 0 ? 'less' : 'more'}`);
-    button.addEventListener('click', () => {
-      const knob = knobs.get(name);
-      order('/api/generator', {[name]: Math.min(300, Math.max(0, knob.watts + watts))});
-    });
-    return button;
-  };
-  value.id = `set-${name}`;
-  item.append(step(-5), value, step(5));
-  $('knobs').append(term, item);
-  knobs.set(name, {value, watts: 0});
-}
-for (const [name, label] of [['cut', 'Cut'], ['coag', 'Coag'], ['blend', 'Blend']]) makeKnob(name, label);
-function showGenerator(figures) {
-  $('generator').hidden = !figures || figures.set_cut_W === undefined;
-  if ($('generator').hidden) return;
-  for (const [name, knob] of knobs) {
-    knob.watts = figures[`set_${name}_W`];
-    setText(knob.value, `${knob.watts.toFixed(0)} W`);
-  }
-}
-
 function showFigures(figures) {
-  showGenerator(figures);
+  generator.show(figures, state.notice);
   if (!figures) return;
   const heat = figures.temperature_C !== undefined;  // Scenes without heat have no temperature.
   setText($('temperature'), heat ? `${figures.temperature_C.toFixed(0)} °C` : '–');
@@ -377,7 +367,7 @@ async function showEnd(before) {
   const key = `${state.session} ${state.has_report} ${state.ended ? state.ended.text : ''}`;
   if (state.phase !== 'idle' || key === ended) return;
   ended = key;
-  if (state.ended) training.ended();
+  if (state.ended) training.ended(state.session);
   $('result').hidden = !state.ended && !state.has_report;
   $('report').hidden = $('questionnaire').hidden = !state.has_report;
   const word = $('result-word');

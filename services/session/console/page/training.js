@@ -3,7 +3,7 @@
 // the page: all pages show the same.
 
 const training = (() => {
-  let shown = null, ran = '';
+  let shown = null, ran = false;
 
   const item = (className, ...children) => {
     const element = make('li', className);
@@ -66,7 +66,7 @@ const training = (() => {
     const byHand = trainee === 'me';
     // The replay of the attempt draws its recording.
     const fields = {scene: exercise.scene, record: 'on', hands: byHand ? 'on' : 'off', trainee};
-    if (await order('/api/start', fields, byHand ? 'Take the controls when the picture comes, and press Stop when you have finished.' : 'The script shows how it is done.')) ran = byHand ? exercise.scene : '';
+    if (await order('/api/start', fields, byHand ? 'Take the controls when the picture comes, and press Stop when you have finished.' : 'The script shows how it is done.')) ran = byHand;
   }
 
   function showAttempt(attempt) {
@@ -178,15 +178,16 @@ const training = (() => {
 
   return {
     load,
-    /** Called when a session has ended: an attempt that began here is shown. */
-    async ended() {
+    /** Called when a session has ended: an attempt that began here is shown. @param session empty if it did not begin. */
+    async ended(session) {
       if (!ran) return;
-      const scene = ran;
-      ran = '';
-      goTo('training');
+      ran = false;
       await load();
-      const newest = shown && shown.attempts.find(a => a.scene === scene && a.trainee === shown.person);
-      if (newest) open(newest);
+      // Without an attempt the view Session stays, which says why.
+      const own = session && shown && shown.attempts.find(a => a.session === session && a.trainee === shown.person);
+      if (!own) return;
+      goTo('training');
+      open(own);
     },
   };
 })();

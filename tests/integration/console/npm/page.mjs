@@ -1,0 +1,107 @@
+// The page beside an imitation of the console: page.mjs FULCRUM CHROMIUM FOLDER PAGE, where PAGE is the folder of its files.
+import {expect, until} from './console.mjs';
+import {Imitation, idle, openPage, running, sleep} from './imitation.mjs';
+
+const [, browserPath, , files] = process.argv.slice(2);
+
+/** Runs `use({page, console})` on a fresh page whose console says `state`. */
+async function withPage(what, state, use) {
+  const console_ = new Imitation();
+  console_.state = state;
+  console_.answers['/api/choices'] = {scenes: [{name: 'built-in', description: 'd', duration: 20, power: 35, picture_rate: 2}], simulated: true, cart: 'simulated'};
+  const {browser, page} = await openPage(browserPath, await console_.start(files));
+  const trouble = [];
+  page.on('pageerror', error => trouble.push(error.message));
+  try {
+    await until(page, 10, phase => document.body.dataset.phase === phase, state.phase);
+    await use({page, console: console_});
+    expect(trouble.length === 0, `no error in the page, but: ${trouble.join('; ')}`);
+    console.log(`ok: ${what}`);
+  } catch (error) {
+    throw new Error(`${what}: ${error.message}`);
+  } finally {
+    await browser.close();
+    console_.end();
+  }
+}
+
+const showsSession = () => document.body.dataset.phase === 'running' && getComputedStyle(document.getElementById('live')).display !== 'none' &&
+  getComputedStyle(document.getElementById('setup')).display === 'none' && document.getElementById('banner').hidden;
+const toastSays = text => !document.getElementById('toast').hidden && document.getElementById('toast').textContent === text;
+
+await withPage('after a lost connection the session and the next notice are shown', running({notice: {number: 4, ok: true, text: 'fourth'}}), async ({page, console}) => {
+  await until(page, 5, showsSession);
+  console.state = running();
+  console.breakStreams();
+  await until(page, 2, () => !document.getElementById('banner').hidden && document.body.dataset.phase === 'unknown');
+  await until(page, 5, showsSession);
+  // A console that was started again counts from 1.
+  console.feed(running({notice: {number: 1, ok: false, text: 'restart failed'}}));
+  await until(page, 2, toastSays, 'restart failed');
+});
+
+await withPage('a silent console is seen', running(), async ({page, console}) => {
+  await until(page, 5, showsSession);
+  console.silent = true;
+  await until(page, 6, () => !document.getElementById('banner').hidden && document.getElementById('status-word').textContent === 'No connection');
+  await sleep(1500);  // The next connection gets no response either.
+  console.silent = false;
+  await until(page, 6, showsSession);
+});
+
+await withPage('quick presses of the generator\u2019s knobs all count', running(), async ({page, console}) => {
+  // As the console: one command at a time, its answer and the report some tenths of a second later.
+  let busy = false, number = 0;
+  console.answers['/api/generator'] = fields => {
+    if (busy) return {ok: false, text: 'the supervisor has not replied to the last request yet; try again'};
+    busy = true;
+    setTimeout(() => {
+      busy = false;
+      console.state = running({figures: {...console.state.figures}, notice: {number: ++number, ok: true, text: 'turned'}});
+      setTimeout(() => { for (const [name, power] of fields) console.state.figures[`set_${name}_W`] = Number(power); }, 150);
+    }, 200);
+    return {ok: true, text: 'sent'};
+  };
+  await until(page, 5, showsSession);
+  for (let press = 0; press < 5; ++press) await page.click('#cut-more');
+  await page.click('#coag-less');
+  await until(page, 3, () => document.getElementById('set-cut').textContent === '60 W' && document.getElementById('set-coag').textContent === '25 W');
+  expect(!(await page.isVisible('#toast.bad')), 'nothing is refused');
+  // Up and down at once: the newest counts, whatever the report says meanwhile.
+  await page.click('#cut-more');
+  await page.click('#cut-less');
+  await sleep(2000);
+  expect(await page.textContent('#set-cut') === '60 W', `the last press counts, but ${await page.textContent('#set-cut')}`);
+  console.answers['/api/generator'] = () => ({ok: false, text: 'no'});
+  await page.click('#cut-more');
+  await until(page, 2, toastSays, 'no');
+  await sleep(600);
+  expect(console.calls.filter(([path, body]) => path === '/api/generator' && body === 'cut=65').length === 2, 'a refused press is not repeated');
+});
+
+await withPage('a session that fails to start opens no older attempt', idle(), async ({page, console}) => {
+  const attempt = session => ({trainee: 'Ann', session, scene: 'line', started: '2026-01-01 00:00:00 UTC', score: 83, well: true});
+  const training = attempts => ({person: 'Ann', instructor: false, group: [], attempts,
+    courses: [{name: 'Basics', description: 'd', exercises: [{scene: 'line', description: 'Exercise: line', pass: 75, scores: [83], cohort: []}]}]});
+  console.answers['/api/training'] = training([attempt('20260101-000000-line')]);
+  console.answers['/api/attempt'] = {sheet: {}, expert: '', labels: {}};
+  console.answers['/api/attempt/events'] = {ready: true, why: '', events: [], left_out: 0};
+  const operate = async (state, ended) => {
+    await page.click('[data-goto=training]');
+    await page.click('[aria-label="Operate line"]');
+    await sleep(200);
+    console.feed(state);
+    await until(page, 3, () => document.body.dataset.view === 'session');
+    console.feed(ended);
+    await until(page, 3, () => document.body.dataset.phase === 'idle');
+    await sleep(500);
+  };
+  await operate(idle({phase: 'starting', own: true}), idle({ended: {well: false, text: 'another session runs in domain 0'}}));
+  expect(!(await page.isVisible('#attempt-box')), 'the attempt of another session stays closed');
+  expect(await page.isVisible('#result-word') && await page.textContent('#result-word') === 'another session runs in domain 0', 'the reason is in view');
+  console.answers['/api/training'] = training([attempt('20260101-000100-line'), attempt('20260101-000000-line')]);
+  await operate(idle({phase: 'starting', own: true}), idle({session: '20260101-000100-line', ended: {well: true, text: 'All went well.'}}));
+  expect(await page.isVisible('#attempt-box') && console.calls.some(([path]) => path === '/api/attempt'), 'its own attempt opens');
+});
+
+console.log('the page beside an imitation of the console');
