@@ -11,11 +11,13 @@ const live = (() => {
   const kKeys = {j: 'jaw', k: 'lock', f: 'cut', g: 'coag', 1: 'tool0', 2: 'tool1', 3: 'tool2', 4: 'tool3', v: 'steady', ' ': 'clutch', Shift: 'fine', Control: 'depth'};
   const kButtons = ['jaw', 'coag', 'cut'];  // Of the mouse: left, middle, right.
   const kPadButtons = {0: 'jaw', 1: 'lock', 2: 'fine', 3: 'steady', 4: 'tool0', 5: 'tool1', 12: 'tool2', 13: 'tool3', 6: 'coag', 7: 'cut', 10: 'clutch'};
+  const kPadRelease = 8, kPadTake = 9;  // Back, Start.
 
   let socket = null, connecting = false, seen = 0, hands = {controls: 'none'}, operated = false, running = false;
   let x = 0, y = 0, turn = 0, roll = 0;
-  const down = new Set(), arrows = new Set();
-  let padDown = new Set();
+  const down = new Set();
+  const held = new Map();  // By code of a key of the keyboard that is down: what it pressed, or the name of an arrow key.
+  let padName = '', padDown = new Set(), padOperates = false;
 
   const mine = () => hands.controls === 'you';
 
@@ -38,7 +40,7 @@ const live = (() => {
   }
   function letGo() {
     for (const key of [...down]) press(key, false);
-    arrows.clear();
+    held.clear();
   }
   function release() {
     letGo();
@@ -82,8 +84,9 @@ const live = (() => {
     hands = state;
     document.body.dataset.controls = hands.controls;
     if (had && !mine()) {
+      padOperates = false;
       down.clear();
-      arrows.clear();
+      held.clear();
       if (document.pointerLockElement) document.exitPointerLock();
     }
     showKeys();
@@ -187,21 +190,32 @@ const live = (() => {
   }, {passive: false});
 
   const typing = () => ['INPUT', 'TEXTAREA', 'SELECT'].includes(document.activeElement.tagName) || document.querySelector('dialog[open]');
-  const keyOf = event => kKeys[event.key] || kKeys[event.key.toLowerCase()];
+  // Digits by their place, because some keyboards have them with Shift only.
+  const keyOf = event => {
+    const digit = event.code.match(/^(?:Digit|Numpad)([1-4])$/);
+    return kKeys[digit ? digit[1] : event.key] || kKeys[event.key.toLowerCase()];
+  };
+  const isArrow = key => key.startsWith('Arrow') || key.startsWith('Page');
+  const holds = key => [...held.values()].includes(key);
   window.addEventListener('keydown', event => {
     if (!mine() || typing()) return;
     if (event.key === 'Escape') return release();
     // A button that has the focus is pressed by the space bar.
     if (event.key === ' ' && document.activeElement.tagName === 'BUTTON') return;
-    if (event.key.startsWith('Arrow') || event.key.startsWith('Page')) arrows.add(event.key);
-    else if (event.key === 'q' || event.key === 'e') roll += event.key === 'q' ? -kTurn : kTurn;
-    else if (!keyOf(event) || event.repeat) return;
-    else press(keyOf(event), true);
+    const letter = event.key.toLowerCase(), key = isArrow(event.key) ? event.key : keyOf(event);
+    if (letter === 'q' || letter === 'e') roll += letter === 'q' ? -kTurn : kTurn;
+    else if (!key || (event.repeat && !isArrow(key))) return;
+    else {
+      held.set(event.code, key);
+      if (!isArrow(key)) press(key, true);
+    }
     event.preventDefault();
   });
   window.addEventListener('keyup', event => {
-    arrows.delete(event.key);
-    if (keyOf(event)) press(keyOf(event), false);
+    // The key that was pressed, whatever it would write now: Shift may have changed in between.
+    const key = held.get(event.code);
+    held.delete(event.code);
+    if (key && !isArrow(key)) press(key, false);
   });
   window.addEventListener('blur', () => { if (mine()) release(); });
 
@@ -218,29 +232,47 @@ const live = (() => {
     for (const kind of ['pointerup', 'pointercancel', 'lostpointercapture']) button.addEventListener(kind, () => set(false));
     button.addEventListener('keydown', event => { if (event.key === 'Enter' || event.key === ' ') set(true); });
     button.addEventListener('keyup', event => { if (event.key === 'Enter' || event.key === ' ') set(false); });
+    button.addEventListener('blur', () => set(false));  // The key goes up elsewhere.
   }
 
+  /** Follows the gamepad also while the controls are released: a button counts only if it is pressed after they were taken. */
   function readPad() {
     const pad = [...(navigator.getGamepads ? navigator.getGamepads() : [])].find(p => p && p.connected);
+    const name = pad ? `${pad.index} ${pad.id}` : '';
+    const pressed = new Set(pad ? [...pad.buttons.keys()].filter(i => pad.buttons[i].pressed) : []);
+    if (name !== padName) {
+      // What it held would stay down.
+      if (mine() && padOperates) release();
+      padName = name;
+      padDown = pressed;
+      padOperates = false;
+    }
     if (!pad) return;
-    const way = v => Math.abs(v) < 0.12 ? 0 : v;
-    x += kStick * way(pad.axes[0] || 0);
-    y -= kStick * way(pad.axes[1] || 0);
-    turn -= 0.5 * way(pad.axes[3] || 0);
-    roll += kTwist * way(pad.axes[2] || 0);
-    const pressed = new Set(Object.keys(kPadButtons).filter(i => pad.buttons[i] && pad.buttons[i].pressed));
-    for (const i of pressed) if (!padDown.has(i)) press(kPadButtons[i], true);
-    for (const i of padDown) if (!pressed.has(i)) press(kPadButtons[i], false);
+    const fresh = [...pressed].filter(i => !padDown.has(i)), up = [...padDown].filter(i => !pressed.has(i));
     padDown = pressed;
+    if (!mine()) {
+      if (!fresh.includes(kPadTake) || !operated || !hands.ready) return;
+      padOperates = true;
+      return start();
+    }
+    if (fresh.includes(kPadRelease)) return release();
+    const [side, back, twist, depth] = [0, 1, 2, 3].map(axis => pad.axes[axis] || 0).map(v => Math.abs(v) < 0.12 ? 0 : v);
+    x += kStick * side;
+    y -= kStick * back;
+    turn -= 0.5 * depth;
+    roll += kTwist * twist;
+    for (const i of fresh) if (kPadButtons[i]) press(kPadButtons[i], true);
+    for (const i of up) if (kPadButtons[i]) press(kPadButtons[i], false);
+    if (fresh.length || side || back || twist || depth) padOperates = true;
   }
 
   setInterval(() => {
+    if (running) readPad();
     if (!mine()) return;
-    readPad();
-    x += kStick * ((arrows.has('ArrowRight') ? 1 : 0) - (arrows.has('ArrowLeft') ? 1 : 0));
-    y += kStick * ((arrows.has('ArrowUp') ? 1 : 0) - (arrows.has('ArrowDown') ? 1 : 0));
+    x += kStick * (holds('ArrowRight') - holds('ArrowLeft'));
+    y += kStick * (holds('ArrowUp') - holds('ArrowDown'));
     for (const button of document.querySelectorAll('#hands [data-step]')) if (button.dataset.down) turn += 0.2 * Number(button.dataset.step);
-    turn += 0.2 * ((arrows.has('PageDown') ? 1 : 0) - (arrows.has('PageUp') ? 1 : 0));
+    turn += 0.2 * (holds('PageDown') - holds('PageUp'));
     sendMotion();
   }, kBeat);
 

@@ -1,6 +1,6 @@
 // The page beside an imitation of the console: page.mjs FULCRUM CHROMIUM FOLDER PAGE, where PAGE is the folder of its files.
 import {expect, until} from './console.mjs';
-import {Imitation, idle, openPage, running, sleep} from './imitation.mjs';
+import {Imitation, idle, keysOf, openPage, running, sleep} from './imitation.mjs';
 
 const [, browserPath, , files] = process.argv.slice(2);
 
@@ -104,4 +104,86 @@ await withPage('a session that fails to start opens no older attempt', idle(), a
   expect(await page.isVisible('#attempt-box') && console.calls.some(([path]) => path === '/api/attempt'), 'its own attempt opens');
 });
 
+/** The page with a live picture and a gamepad without a button pressed. */
+async function withHands(what, use) {
+  await withPage(what, running(), async ({page, console}) => {
+    await until(page, 5, () => !document.getElementById('hands').hidden && !document.getElementById('take').disabled);
+    const pad = buttons => page.evaluate(down => {
+      window.pads = down && [{connected: true, index: 0, id: 'pad', axes: [0, 0, 0, 0], buttons: Array.from({length: 17}, (_, i) => ({pressed: down.includes(i)}))}] || [null];
+    }, buttons);
+    await pad([]);
+    await sleep(100);
+    await use({page, console, pad});
+  });
+}
+const take = async page => {
+  await page.click('#take');
+  await until(page, 2, () => document.body.dataset.controls === 'you');
+  await keysOf(page);
+};
+
+await withHands('a gamepad that is lost lets everything go', async ({page, pad}) => {
+  await take(page);
+  await pad([7]);
+  await until(page, 2, () => window.sent.includes('down=cut'));
+  await pad(null);
+  await until(page, 2, () => document.body.dataset.controls === 'none');
+  const sent = await keysOf(page);
+  expect(sent.includes('up=cut') && sent.includes('release=1'), `the pedal rises, but ${sent}`);
+});
+
+await withHands('a trigger that was down before does not press; Start takes and Back releases', async ({page, pad}) => {
+  await pad([7]);
+  await sleep(100);
+  await take(page);
+  await sleep(150);
+  expect((await keysOf(page)).length === 0, 'a trigger held while the controls are taken is no pedal');
+  await pad([]);
+  await sleep(60);
+  await pad([7]);
+  await until(page, 1, () => window.sent.includes('down=cut'));
+  await pad([8]);
+  await until(page, 1, () => document.body.dataset.controls === 'none');
+  await pad([9]);
+  await until(page, 1, () => document.body.dataset.controls === 'you');
+});
+
+await withHands('a held button rises when the focus leaves it', async ({page}) => {
+  await take(page);
+  await page.focus('[data-key=cut]');
+  await page.keyboard.down('Space');
+  await until(page, 1, () => window.sent.includes('down=cut'));
+  await page.keyboard.press('Tab');
+  await until(page, 1, () => window.sent.includes('up=cut'));
+  await page.keyboard.up('Space');
+  expect(await page.getAttribute('[data-key=cut]', 'aria-pressed') === 'false', 'Cut is up');
+});
+
+await withHands('keys work beside Shift and on keyboards that have digits with Shift only', async ({page}) => {
+  await take(page);
+  await page.focus('#picture');
+  await page.keyboard.down('Shift');
+  await page.evaluate(() => { window.sent = []; });
+  await page.keyboard.press('Q');
+  await until(page, 1, () => window.sent.some(text => /roll=-5/.test(text)));
+  await page.keyboard.up('Shift');
+  await keysOf(page);
+  // The first key of the row of digits of a French keyboard.
+  const key = (type, text) => page.evaluate(([kind, value]) => document.getElementById('picture').dispatchEvent(new KeyboardEvent(kind, {key: value, code: 'Digit1', bubbles: true})), [type, text]);
+  await key('keydown', '&');
+  await key('keyup', '1');
+  await key('keydown', '1');
+  await key('keyup', '&');
+  expect((await keysOf(page)).join() === 'down=tool0,up=tool0,down=tool0,up=tool0', 'each press chooses the tool');
+  await page.keyboard.down('ArrowUp');
+  await page.keyboard.down('f');
+  await page.keyboard.down('Shift');
+  await page.keyboard.up('f');
+  await page.keyboard.up('ArrowUp');
+  await page.keyboard.up('Shift');
+  expect((await keysOf(page)).join() === 'down=cut,down=fine,up=cut,up=fine', 'a key rises whatever it would write now');
+  await page.evaluate(() => { window.sent = []; });
+  await sleep(100);
+  expect(await page.evaluate(() => window.sent.length > 0 && window.sent.every(text => /x=-?0.00&y=-?0.00/.test(text))), 'the arrow has risen');
+});
 console.log('the page beside an imitation of the console');
