@@ -1,6 +1,8 @@
 #include "haptics_node/device/operated_device.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "services/base/core/operator_choice.h"
 
@@ -11,6 +13,7 @@ namespace {
 /// that an operator who takes the controls with another place in mind does not strike the tissue.
 constexpr double kFastest_m_s = 0.6;
 constexpr double kFastestTurn_rad_s = 6;
+constexpr float kPi = std::numbers::pi_v<float>;
 
 }  // namespace
 
@@ -20,6 +23,10 @@ OperatedDevice::OperatedDevice(const HandModel& hand, const Trocar& trocar, cons
 }
 
 void OperatedDevice::Follow(const OperatorTool& intention, std::int64_t stamp_ns) noexcept {
+  // Another hand may count its turns anew: the tool is turned alike, and must not turn there once more.
+  const bool begins =
+      intention.moves && (!intention_.moves || std::abs(intention.roll_rad - intention_.roll_rad) > kPi);
+  if (begins) roll_ += 2 * kPi * std::round((intention.roll_rad - roll_) / (2 * kPi));
   intention_ = intention;
   intention_ns_ = stamp_ns;
 }

@@ -51,13 +51,4 @@ Vec3d ForceAtTip(const TrocarPose& pose, const Vec3d& f_A) noexcept {
   return f_T;
 }
 
-Eigen::Quaterniond ToolOrientation(const Vec3d& d_W, const Vec3d& x_reference) noexcept {
-  Vec3d x = x_reference - x_reference.dot(d_W) * d_W;
-  const double norm = x.norm();
-  x = norm > 0.0 ? Vec3d(x / norm) : d_W.unitOrthogonal();
-  Eigen::Matrix3d R;
-  R << x, d_W.cross(x), d_W;
-  return Eigen::Quaterniond(R);
-}
-
 }  // namespace fulcrum::haptics

@@ -47,8 +47,4 @@ struct TrocarPose {
 /// the tip does not move along the shaft and the axial component is 0.
 [[nodiscard]] Vec3d ForceAtTip(const TrocarPose& pose, const Vec3d& f_A) noexcept;
 
-/// Orientation of the tool frame: z along the shaft, x the projection of `x_reference` on the plane normal to it.
-/// @pre x_reference is a unit vector; for a shaft parallel to it x is arbitrary.
-[[nodiscard]] Eigen::Quaterniond ToolOrientation(const Vec3d& d_W, const Vec3d& x_reference) noexcept;
-
 }  // namespace fulcrum::haptics

@@ -7,6 +7,7 @@
 #include "services/base/core/error.h"
 #include "services/base/core/hash.h"
 #include "services/base/core/scope.h"
+#include "services/base/core/tool_roll.h"
 
 namespace fulcrum::haptics {
 namespace {
@@ -17,24 +18,6 @@ constexpr double kVelocityFilter_s = 0.003;
 // Bounds of the time between two ticks [s]: below, a difference quotient is mostly noise; above, the servo was delayed.
 constexpr double kMinDt_s = 1e-4;
 constexpr double kMaxDt_s = 0.02;
-
-/// Middle of the tissue at rest; the origin of W for a scene without any.
-Vec3f FieldCentre(const SceneView& scene) {
-  Vec3f sum = Vec3f::Zero();
-  for (const Vec3f& place : scene.rest_position) sum += place;
-  return scene.rest_position.empty() ? sum : Vec3f(sum / static_cast<float>(scene.rest_position.size()));
-}
-
-/// A scope's x axis shows to the right in the picture, so that the picture is level without roll. @param up of the
-/// scene's line of sight, so that the axis does not jump.
-Vec3d RightOf(const Vec3d& d_W, const Vec3d& up) { return d_W.cross(up).normalized(); }
-
-/// World X, or Y where the direction from trocar to tissue is within 18 degrees of X. The roll of a tool is arbitrary,
-/// but it must not jump during a motion or at a restart.
-Vec3d RollReference(const Vec3f& p_WP, const Vec3f& field_centre) {
-  constexpr float kNearlyAlong = 0.95f;
-  return std::abs((field_centre - p_WP).normalized().x()) > kNearlyAlong ? Vec3d::UnitY() : Vec3d::UnitX();
-}
 
 }  // namespace
 
@@ -54,8 +37,7 @@ Servo::Servo(const ServoSettings& settings, const Devices& devices) : force_scal
     channel.device = devices[i];
     channel.kind = tool.kind;
     channel.trocar = {tool.p_WP.cast<double>(), tool.shaft_length_m};
-    channel.x_reference = tool.kind == ToolKind::kScope ? settings.level_up.cast<double>()
-                                                        : RollReference(tool.p_WP, settings.field_centre);
+    channel.roll_reference = RollReference(tool, settings.field_centre, settings.level_up);
     channel.output.limit_N = settings.params.force_limit_N;
     channel.output.slew_N_per_ms = settings.params.slew_N_per_ms;
   }
@@ -131,10 +113,7 @@ void Servo::Render(Channel* channel, const Tick& tick) const noexcept {
 
 void Servo::TrackProxy(Channel* channel, const Vec3d& offset, bool first) const noexcept {
   const Vec3d p_WT = channel->pose.p_WT + offset;
-  const Vec3d& d_W = channel->pose.d_W;
-  const Vec3d& reference = channel->x_reference;
-  Eigen::Quaterniond q_WT =
-      ToolOrientation(d_W, channel->kind == ToolKind::kScope ? RightOf(d_W, reference) : reference);
+  Eigen::Quaterniond q_WT = LevelOrientation(channel->kind, channel->pose.d_W, channel->roll_reference);
   if (channel->roll != 0) q_WT = q_WT * Eigen::AngleAxisd(static_cast<double>(channel->roll), Vec3d::UnitZ());
   if (!first) {
     const double blend = dt_ / (dt_ + kVelocityFilter_s);

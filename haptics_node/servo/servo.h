@@ -71,7 +71,7 @@ class Servo {
     HapticDevice* device = nullptr;
     ToolKind kind = ToolKind::kNone;
     Trocar trocar;
-    Vec3d x_reference = Vec3d::UnitX();
+    Vec3d roll_reference = Vec3d::UnitX();
     // State.
     bool started = false;
     Vec3d p_WA = Vec3d::Zero(), moved = Vec3d::Zero(), v_WA = Vec3d::Zero();

@@ -3,10 +3,20 @@
 #include <cmath>
 
 #include "render_node/geometry/laparoscope.h"
+#include "services/base/core/scope.h"
+#include "services/base/core/tool_roll.h"
 
 namespace fulcrum::render {
 
-HandsView MakeHandsView(const SceneView& scene, const RenderParams& camera, int height, const ToolState& tools) {
+std::array<Vec3d, kMaxTools> RollReferences(const SceneView& scene) {
+  const Vec3f field_centre = FieldCentre(scene), level_up = LevelUp(scene.render);
+  std::array<Vec3d, kMaxTools> references;
+  for (std::size_t i = 0; i < kMaxTools; ++i) references[i] = RollReference(scene.tools[i], field_centre, level_up);
+  return references;
+}
+
+HandsView MakeHandsView(const SceneView& scene, const RenderParams& camera, int height, const ToolState& tools,
+                        const std::array<Vec3d, kMaxTools>& roll_references) {
   const Eigen::Matrix4f view = MakeLaparoscope(camera).view;
   constexpr float kRadPerDeg = 0.0174532925f;
   HandsView hands;
@@ -19,6 +29,9 @@ HandsView MakeHandsView(const SceneView& scene, const RenderParams& camera, int 
     hands.present[i] = tools.tools[i].kind != ToolKind::kNone && !scene.tools[i].assists();
     hands.scope[i] = tools.tools[i].kind == ToolKind::kScope;
     hands.tip[i] = tools.tools[i].p_WT;
+    if (tools.tools[i].kind != ToolKind::kNone) {
+      hands.roll_rad[i] = ToolRoll(tools.tools[i].kind, tools.tools[i].q_WT, roll_references[i]);
+    }
     hands.force_N[i] = tools.tools[i].f_W.norm();
   }
   return hands;

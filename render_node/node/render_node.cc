@@ -31,6 +31,7 @@ constexpr double kLate_s = 0.3;      // Timeout of topics with a rate of 100 Hz.
 RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, const RenderPorts& ports,
                        std::unique_ptr<Stage> stage)
     : scene_(scene),
+      roll_references_(RollReferences(scene)),
       window_(settings.window),
       ports_(ports),
       stage_(stage ? std::move(stage) : std::make_unique<Stage>(scene, settings.window, settings.look)),
@@ -313,7 +314,9 @@ void RenderNode::TakeSize() {
   changed_on_screen_ = true;
 }
 
-HandsView RenderNode::ViewNow() const { return MakeHandsView(scene_, camera_.params(), shape_.height, tools_); }
+HandsView RenderNode::ViewNow() const {
+  return MakeHandsView(scene_, camera_.params(), shape_.height, tools_, roll_references_);
+}
 
 PictureHeader RenderNode::HeaderNow() {
   PictureHeader header = MakePictureHeader(ViewNow());

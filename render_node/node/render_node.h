@@ -152,6 +152,7 @@ class RenderNode {
   }
 
   SceneView scene_;
+  std::array<Vec3d, kMaxTools> roll_references_;  ///< Of the scene's tools.
   bool window_;
   RenderPorts ports_;
   std::unique_ptr<Stage> stage_;

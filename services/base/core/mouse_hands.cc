@@ -25,7 +25,9 @@ constexpr float kSteady_s = 0.06f;
 
 void MouseHands::SetView(const HandsView& view) {
   for (std::size_t i = 0; i < view.present.size(); ++i) {
-    if (view.present[i] && !view_.present[i]) wanted_[i] = sent_[i] = view.tip[i];
+    if (!view.present[i] || view_.present[i]) continue;
+    wanted_[i] = sent_[i] = view.tip[i];
+    roll_[i] = view.roll_rad[i];
   }
   view_ = view;
   const auto first = std::find(view_.present.begin(), view_.present.end(), true);
@@ -37,6 +39,7 @@ void MouseHands::SetView(const HandsView& view) {
 void MouseHands::Take(std::int64_t now_ns) {
   claim_ns_ = sent_ns_ = now_ns;
   wanted_ = sent_ = view_.tip;
+  roll_ = view_.roll_rad;
   locked_ = {};
 }
 

@@ -19,6 +19,7 @@ struct HandsView {
   std::array<bool, kMaxTools> present{};              ///< The session has this tool, and a person operates it.
   std::array<bool, kMaxTools> scope{};                ///< It is a scope: its motion moves the picture.
   std::array<Vec3f, kMaxTools> tip = AtOrigin();      ///< Newest places of the tips [m].
+  std::array<float, kMaxTools> roll_rad{};            ///< Newest rolls about the shafts [rad].
   std::array<float, kMaxTools> force_N{};             ///< Forces at the tips [N].
 };
 
@@ -46,7 +47,7 @@ class MouseHands {
   /// A tool that was not there before begins where it is.
   void SetView(const HandsView& view);
 
-  /// Takes the controls: the tools begin where they are.
+  /// Takes the controls: the tools begin where they are, turned as they are.
   void Take(std::int64_t now_ns);
   /// Releases them: pedals up, tools let go.
   void Release();
@@ -75,7 +76,7 @@ class MouseHands {
   void MoveTip(const Vec3f& by);
   void Choose(int tool);
 
-  const OperatorSource source_;
+  OperatorSource source_;
   HandsView view_;
   std::int64_t claim_ns_ = 0;
   int tool_ = 1;

@@ -98,7 +98,7 @@ struct Console::Impl {
                {.handle = [this](const HttpRequest& request) { return Handle(request); },
                 .knows = [this](const HttpRequest& request) { return access->HasToken(request); }}) {
     watch.OnLeave([this] {
-      live.SetSession({});
+      live.SetSession({}, 0);
       live_session = 0;  // A session whose supervisor was silent for a while is joined again.
     });
     token_file = settings.token_file.empty() ? DefaultTokenFile(server.port()) : settings.token_file;
@@ -116,7 +116,7 @@ struct Console::Impl {
 
   // The bus and the films call the server for each picture: they end first.
   ~Impl() {
-    live.SetSession({});
+    live.SetSession({}, 0);
     films.End();
   }
   Impl(const Impl&) = delete;
@@ -399,12 +399,13 @@ struct Console::Impl {
   void ShowLive(std::int64_t now) {
     if (watch.begun() && live_session != watch.session()) {
       live_session = watch.session();
-      live.SetSession([this] {
+      const auto make = [this] {
         bus::DdsParticipant& bus = watch.participant();
         // The server's thread waits for clients: a picture wakes it.
         return LiveView::Ports{bus.MakeInput<Picture>([this] { server.Post([this] { live.Turn(MonotonicNs()); }); }),
                                bus.MakeInput<OperatorInput>(), bus.MakeOutput<OperatorInput>()};
-      });
+      };
+      live.SetSession(make, live_session);
     }
     live.Turn(now);
   }

@@ -6,6 +6,7 @@
 // the page: pictures as JPEG files, and the state of the controls as JSON.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -36,8 +37,9 @@ class LiveView {
   /// viewers, and the session has no live picture.
   using MakePorts = std::function<Ports()>;
 
-  /// A session has begun, or ended (empty).
-  void SetSession(MakePorts make);
+  /// A session has begun, or ended (empty, 0). @param session its number: in one that is joined again the tools are
+  /// still turned as its operators have turned them.
+  void SetSession(MakePorts make, std::uint64_t session);
 
   void Open(Socket* viewer);
   void Close(Socket* viewer, std::int64_t now_ns);
@@ -55,6 +57,7 @@ class LiveView {
   };
 
   void Apply(const Form& form, std::int64_t now_ns);
+  void NoteRolls(const OperatorInput& input);
   void Write(std::int64_t now_ns);
   void ReadOthers(std::int64_t now_ns);
   void SendPicture(Socket* socket, Viewer* viewer);
@@ -64,12 +67,14 @@ class LiveView {
   void Release(std::int64_t now_ns);
 
   MakePorts make_;
-  std::string trouble_;  ///< Why the ports could not be made.
+  std::uint64_t session_ = 0;  ///< The newest.
+  std::string trouble_;        ///< Why the ports could not be made.
   Ports ports_;
   std::map<Socket*, Viewer> viewers_;
   Socket* holder_ = nullptr;  ///< The viewer with the controls.
   OperatorSource other_ = OperatorSource::kNone;
   MouseHands hands_{OperatorSource::kBrowser};
+  std::array<float, kMaxTools> roll_rad_{};  ///< To which an operator has turned each tool last.
   std::unique_ptr<bus::Stamper> stamper_;
   std::uint64_t epoch_ = 0;
   OperatorChoice choice_;

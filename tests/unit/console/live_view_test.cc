@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "services/base/core/scope.h"
 #include "services/transport/bus/in_process.h"
 
 namespace fulcrum::console {
@@ -33,13 +34,15 @@ class Page final : public Socket {
 
 class LiveViewTest : public testing::Test {
  protected:
-  LiveViewTest() {
-    live_.SetSession([this] {
+  LiveViewTest() { Join(1); }
+
+  void Join(std::uint64_t session) {
+    const auto make = [this] {
       ++joined_;
       return LiveView::Ports{pictures_.MakeInput(), hands_.MakeInput(), hands_.MakeOutput()};
-    });
+    };
+    live_.SetSession(make, session);
   }
-
   void Draw() {
     Picture picture;
     picture.header.stamp = {++drawn_, 3, now_};
@@ -177,6 +180,59 @@ TEST_F(LiveViewTest, AnotherSourceTakesTheControls) {
   EXPECT_EQ(Newest().claim_ns, 0) << "the page moves nothing now";
 }
 
+TEST_F(LiveViewTest, ToolsKeepTheirRollWhoeverTakesThem) {
+  Page page;
+  live_.Open(&page);
+  Turn();
+  Draw();
+  Say(&page, "take=1");
+  Say(&page, "roll=57.29578");
+  EXPECT_NEAR(Newest().tools[1].roll_rad, 1, 1e-5);
+  Say(&page, "release=1");
+  Say(&page, "take=1");
+  EXPECT_NEAR(Newest().tools[1].roll_rad, 1, 1e-5);
+  const auto window = hands_.MakeOutput();
+  OperatorInput input;
+  input.stamp = {1, 77, now_ + kMs};
+  input.claim_ns = now_ + kMs;
+  input.source = OperatorSource::kWindow;
+  input.tools[1] = {Vec3f::Zero(), 0, -0.25f, true};
+  ASSERT_TRUE(window->Write(input));
+  now_ += kMs;
+  Turn();
+  (void)Newest();
+  Say(&page, "take=1");
+  EXPECT_EQ(Newest().tools[1].roll_rad, -0.25f) << "as the window has left it";
+}
+
+TEST_F(LiveViewTest, TheNextSessionBeginsWithoutWhatTheLastOperatorChose) {
+  Page page;
+  live_.Open(&page);
+  Turn();
+  Draw();
+  Say(&page, "take=1");
+  Say(&page, "down=tool0&roll=60");
+  Say(&page, "down=steady");
+  EXPECT_TRUE(page.Shows("\"tool\":0")) << page.states.back();
+  EXPECT_TRUE(page.Shows("\"steady\":true")) << page.states.back();
+  live_.SetSession({}, 0);
+  Join(1);  // Its supervisor was silent for a while.
+  Turn();
+  Draw();
+  Say(&page, "take=1");
+  EXPECT_NEAR(Newest().tools[0].roll_rad, RadiansOf(60), 1e-5);
+  live_.SetSession({}, 0);
+  Join(2);
+  Turn();
+  Draw();
+  Say(&page, "take=1");
+  const OperatorInput input = Newest();
+  EXPECT_NE(input.claim_ns, 0);
+  EXPECT_EQ(input.tools[0].roll_rad, 0);
+  EXPECT_TRUE(page.Shows("\"tool\":1")) << page.states.back();
+  EXPECT_TRUE(page.Shows("\"steady\":false")) << page.states.back();
+}
+
 TEST_F(LiveViewTest, MalformedMessagesHaveNoEffect) {
   Page page;
   live_.Open(&page);
@@ -199,7 +255,7 @@ TEST_F(LiveViewTest, NothingOfASessionStaysAfterItsEnd) {
   Turn();
   Draw();
   Say(&page, "take=1");
-  live_.SetSession({});
+  live_.SetSession({}, 0);
   EXPECT_TRUE(page.Shows("\"controls\":\"none\""));
   EXPECT_TRUE(page.Shows("\"ready\":false"));
   EXPECT_FALSE(picture_out_->has_readers());
@@ -210,17 +266,18 @@ TEST_F(LiveViewTest, NothingOfASessionStaysAfterItsEnd) {
 
 TEST_F(LiveViewTest, ABusThatCannotBeJoinedIsReportedAndTriedAgainInTheNextSession) {
   int tries = 0;
-  live_.SetSession([&]() -> LiveView::Ports {
+  const auto make = [&]() -> LiveView::Ports {
     ++tries;
     throw std::runtime_error("shared memory is full");
-  });
+  };
+  live_.SetSession(make, 2);
   Page page;
   live_.Open(&page);
   Turn();
   Turn();
   EXPECT_EQ(tries, 1);
   EXPECT_TRUE(page.Shows("\"trouble\":\"shared memory is full\""));
-  live_.SetSession({});
+  live_.SetSession({}, 0);
   EXPECT_FALSE(page.Shows("trouble"));
 }
 

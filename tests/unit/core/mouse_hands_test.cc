@@ -121,6 +121,23 @@ TEST_F(MouseHandsTest, ControlsTakenBeforeTheToolsAreKnownMoveNothing) {
   for (std::size_t i = 0; i < kMaxTools; ++i) EXPECT_EQ(input.tools[i].p_WT, View().tip[i]) << "not the origin of W";
 }
 
+TEST_F(MouseHandsTest, WhoTakesThemFindsTheToolsTurnedAsTheyAre) {
+  hands_.Take(5 * kMs);
+  hands_.Roll(2);
+  hands_.Release();
+  HandsView view = View();
+  view.roll_rad = {-0.3f, 0.5f};
+  hands_.SetView(view);
+  hands_.Take(6 * kMs);
+  const OperatorInput input = hands_.At(7 * kMs);
+  EXPECT_EQ(input.tools[0].roll_rad, -0.3f);
+  EXPECT_EQ(input.tools[1].roll_rad, 0.5f) << "not the 2 of the last person";
+  // Newer rolls of the tools do not turn what is held.
+  view.roll_rad = {};
+  hands_.SetView(view);
+  EXPECT_EQ(hands_.At(8 * kMs).tools[1].roll_rad, 0.5f);
+}
+
 TEST_F(MouseHandsTest, AScopeTurnsWithThePointerRollsAndZooms) {
   HandsView view = View();
   view.present[2] = view.scope[2] = true;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "haptics_node/device/simulated_device.h"
 #include "services/base/core/operator_choice.h"
@@ -49,6 +50,32 @@ TEST(OperatedDevice, TurnsAboutItsShaftAtBoundedSpeed) {
   EXPECT_LT(device.ReadRoll(), 0.6f);
   Operate(&device, 60, 400, intention);
   EXPECT_FLOAT_EQ(device.ReadRoll(), 1);
+}
+
+TEST(OperatedDevice, AnotherHandThatCountsItsTurnsAnewDoesNotTurnTheTool) {
+  OperatedDevice device({}, BenchTrocar(), RestingAttachPoint(BenchTrocar()));
+  OperatorTool intention = At(Tip(device.ReadPosition(TickAt(1))).cast<float>());
+  intention.roll_rad = 4.7f;
+  for (std::uint64_t i = 2; i < 1000; i += 20) {
+    intention.roll_rad = std::min(4.7f, 0.1f * static_cast<float>(i) / 20);
+    Operate(&device, i, i + 20, intention);
+  }
+  Operate(&device, 1000, 2000, intention);
+  EXPECT_NEAR(device.ReadRoll(), intention.roll_rad, 1e-5f);
+  const float turned = intention.roll_rad;
+  // It takes the tool from the one that operates …
+  intention.roll_rad -= 6.2831853f;
+  for (std::uint64_t i = 2000; i < 2500; ++i) {
+    Operate(&device, i, i + 1, intention);
+    ASSERT_NEAR(std::remainder(device.ReadRoll() - turned, 6.2831853f), 0, 1e-5f) << i;
+  }
+  // … or finds it released.
+  Operate(&device, 2500, 3000, OperatorTool());
+  intention.roll_rad = turned;
+  for (std::uint64_t i = 3000; i < 3500; ++i) {
+    Operate(&device, i, i + 1, intention);
+    ASSERT_NEAR(std::remainder(device.ReadRoll() - turned, 6.2831853f), 0, 1e-5f) << i;
+  }
 }
 
 TEST(OperatedDevice, AFarPlaceIsReachedAtBoundedSpeed) {

@@ -4,6 +4,8 @@
 
 #include <random>
 
+#include "services/base/core/tool_roll.h"
+
 namespace fulcrum::haptics {
 namespace {
 
