@@ -384,7 +384,7 @@ struct Console::Impl {
     const std::int64_t now = MonotonicNs();
     watch.Turn(now);
     run.Poll();
-    if (watch.begun()) run.NoteBegun();
+    if (watch.begun()) run.NoteBegun(watch.session());
     ShowLive(now);
     if (task) task->Poll(now);
     if (watch.begun() && watch.manifest().session_id != session) ShowSession(watch.manifest().session_id);

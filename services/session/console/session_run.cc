@@ -70,7 +70,18 @@ void SessionRun::Start(const SessionOrder& order) {
   up_ = runtime::ChildProcess::Start(settings_.program, UpWords(settings_, order), log_, runtime::WithParent::kStays);
   stopping_ = begun_ = false;
   recording_ = order.record;
+  own_ = 0;
   end_.reset();
+}
+
+void SessionRun::NoteBegun(std::uint64_t session) {
+  begun_ = up_.running();
+  if (begun_) {
+    own_ = session;
+  } else if (session != own_) {
+    // The own session may still be on the bus when its process has ended.
+    end_.reset();
+  }
 }
 
 void SessionRun::Stop() {

@@ -48,8 +48,9 @@ class SessionRun {
   void Stop();
   /// Detects the end of the session.
   void Poll();
-  /// The session is seen on the bus: its nodes are ready.
-  void NoteBegun() { begun_ = up_.running(); }
+  /// A session is seen on the bus: its nodes are ready. One that was started elsewhere has an end of its own, which
+  /// is not known here. @param session its number, not 0.
+  void NoteBegun(std::uint64_t session);
 
   [[nodiscard]] bool running() const { return up_.running(); }
   [[nodiscard]] bool stopping() const { return stopping_; }
@@ -59,7 +60,7 @@ class SessionRun {
   [[nodiscard]] const SessionRunSettings& settings() const { return settings_; }
   /// Newest line of the output of `fulcrum up`.
   [[nodiscard]] std::string LastWord() const;
-  /// End of the last session; nullopt before the first one and while one runs.
+  /// End of the last session; nullopt before the first one, while one runs, and after one that was started elsewhere.
   [[nodiscard]] const std::optional<SessionEnd>& end() const { return end_; }
   /// Time that a dump covers [s].
   static constexpr int kKeep_s = 30;
@@ -69,6 +70,7 @@ class SessionRun {
   std::filesystem::path log_;
   runtime::ChildProcess up_;
   bool stopping_ = false, begun_ = false, recording_ = false;
+  std::uint64_t own_ = 0;  ///< Number of the last session that was started here; 0: it has not begun.
   std::optional<SessionEnd> end_;
 };
 

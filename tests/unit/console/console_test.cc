@@ -375,6 +375,31 @@ TEST(SessionRun, WordsOfAnOrder) {
   EXPECT_TRUE(std::equal(scored.begin(), scored.end(), words.end() - 4));
 }
 
+TEST(SessionRun, ItsEndIsNotThatOfASessionStartedElsewhere) {
+  const fs::path folder = fs::temp_directory_path() / ("console_end_test." + std::to_string(::getpid()));
+  SessionRunSettings settings;
+  settings.out = folder;
+  settings.program = "/bin/false";
+  SessionRun run(settings);
+  const SessionOrder order{.scene = "small", .power_W = {}, .seconds = {}, .picture_rate_Hz = {}, .trainee = {}};
+  run.Start(order);
+  run.NoteBegun(5);
+  while (run.running()) run.Poll();
+  ASSERT_TRUE(run.end());
+  EXPECT_FALSE(run.end()->well);
+  run.NoteBegun(5);
+  EXPECT_TRUE(run.end()) << "its own session is still on the bus";
+  run.NoteBegun(6);
+  EXPECT_FALSE(run.end());
+  // One that did not begin.
+  run.Start(order);
+  while (run.running()) run.Poll();
+  EXPECT_TRUE(run.end());
+  run.NoteBegun(5);
+  EXPECT_FALSE(run.end());
+  fs::remove_all(folder);
+}
+
 TEST(LiveState, ASessionThatWritesItsReportIsNotStarting) {
   const fs::path folder = fs::temp_directory_path() / ("console_run_test." + std::to_string(::getpid()));
   fs::create_directories(folder);
@@ -400,7 +425,7 @@ TEST(LiveState, ASessionThatWritesItsReportIsNotStarting) {
   EXPECT_EQ(phase(), R"({"phase":"idle")");
   run.Start({.scene = "small", .power_W = {}, .seconds = {}, .picture_rate_Hz = {}, .trainee = {}});
   EXPECT_EQ(phase(), R"({"phase":"starting")");
-  run.NoteBegun();
+  run.NoteBegun(5);
   EXPECT_EQ(phase(), R"({"phase":"stopping")") << "it is on the bus no more";
   std::ofstream(folder / "report") << "written\n";
   while (run.running()) run.Poll();
