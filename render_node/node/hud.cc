@@ -129,7 +129,7 @@ std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
     if (const auto& force_N = state.force_N[static_cast<std::size_t>(tool)]) {
       const std::string does = NameOf(state.flow[static_cast<std::size_t>(tool)]);
       texts.push_back({Corner::kBottomLeft, line++, ForceBar(tool, *force_N, state.force_limit_N) + does,
-                       *force_N > state.force_limit_N});
+                       *force_N > state.force_limit_N && !state.assists[static_cast<std::size_t>(tool)]});
     }
   }
   const char* mode = (state.pedals & kPedalBlend)  ? "BLEND"

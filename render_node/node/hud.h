@@ -24,6 +24,7 @@ struct HudState {
   std::array<TubeFlow, kMaxTools> flow{};               ///< Of a suction and irrigation tube.
   bool tube = false;                                    ///< The scene has one.
   float force_limit_N = 1;                              ///< Force that fills the bar; above it the bar is a warning.
+  std::array<bool, kMaxTools> assists{};                ///< Held for the trainee: its bar is never a warning.
   std::optional<float> tip_C;  ///< Hottest texel of the newest patch; no value once the patch is old.
   float slit_m = 0;
   Alarm ureter = Alarm::kNone, nerve = Alarm::kNone;

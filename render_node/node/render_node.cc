@@ -231,6 +231,7 @@ void RenderNode::UpdateTexts() {
   for (std::size_t k = 0; k < kMaxTools; ++k) {
     const bool there = TouchesTissue(tools_.tools[k].kind);
     hud_.force_N[k] = there ? std::optional(force_N_[k]) : std::nullopt;
+    hud_.assists[k] = scene_.tools[k].assists();
   }
   const auto alarm = [this](std::size_t k) {
     return injured_[k] ? Alarm::kInjured : Recent(warned_s_[k]) ? Alarm::kHot : Alarm::kNone;

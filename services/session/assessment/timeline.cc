@@ -117,7 +117,9 @@ const char* KeyOf(const Happening& happening) {
 }
 
 Timeline::Timeline(std::int64_t session_start_ns, const SceneView* scene) : start_ns_(session_start_ns) {
-  if (scene != nullptr) force_.emplace(scene->assessment, scene->physics);
+  if (scene == nullptr) return;
+  force_.emplace(scene->assessment, scene->physics);
+  for (std::size_t i = 0; i < kMaxTools; ++i) assists_[i] = scene->tools[i].assists();
 }
 
 std::size_t Timeline::Begin(const Happening& happening) {
@@ -162,7 +164,12 @@ void Timeline::Add(const ContactModel& model) {
 void Timeline::AddForces(double time_s, const ContactModel& model) {
   std::array<int, kMaxTools> slips{};
   for (std::size_t i = 0; i < kMaxTools; ++i) slips[i] = force_->tool(static_cast<int>(i)).slips;
-  if (force_->Add(time_s, model).too_high) {
+  // As in the score, which is the trainee's.
+  ContactModel own = model;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    if (assists_[i]) own.devices[i] = {};
+  }
+  if (force_->Add(time_s, own).too_high) {
     // Forces that fall below the limit for a moment are one.
     const bool same = high_force_ < kMost && time_s - list_[high_force_].until_s < kSame_s;
     if (!same) high_force_ = Begin({.time_s = time_s, .until_s = time_s, .kind = HappeningKind::kForce});

@@ -49,7 +49,7 @@ class Timeline {
   static constexpr std::size_t kMost = 500;
 
   /// @param session_start_ns CLOCK_MONOTONIC at session time 0 [ns]; earlier messages do not count.
-  /// @param scene of the session; null: neither forces nor slips are judged.
+  /// @param scene of the session; null: neither forces nor slips are judged. Those of an assistant never are.
   explicit Timeline(std::int64_t session_start_ns, const SceneView* scene = nullptr);
 
   void Add(const ToolState& state);
@@ -73,7 +73,8 @@ class Timeline {
 
   std::int64_t start_ns_;
   std::optional<ForceMeter> force_;
-  std::size_t high_force_ = kMost;  ///< Index in `list_` of the newest.
+  std::array<bool, kMaxTools> assists_{};  ///< The scene holds this tool for the trainee.
+  std::size_t high_force_ = kMost;         ///< Index in `list_` of the newest.
   std::vector<Happening> list_;
   std::size_t left_out_ = 0;
   std::array<ToolKind, kMaxTools> kinds_{};

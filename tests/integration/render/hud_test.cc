@@ -56,6 +56,9 @@ TEST(Hud, TheBarIsFullAtTheHighestForceAllowedAndAWarningAbove) {
   EXPECT_FALSE(bar("L ▮▮▮▮▮▮▮▮▮▮ 4.0 N")->warning);
   ASSERT_NE(bar("R ▮▮▮▮▮▮▮▮▮▮ 7.7 N"), texts.end());
   EXPECT_TRUE(bar("R ▮▮▮▮▮▮▮▮▮▮ 7.7 N")->warning);
+  // The assistant's force is not the trainee's.
+  state.assists[1] = true;
+  for (const OverlayText& text : HudTexts(state, true)) EXPECT_FALSE(text.warning) << text.text;
 }
 
 }  // namespace

@@ -74,6 +74,22 @@ TEST(Timeline, ForcesAboveTheLimitAndSlips) {
   EXPECT_EQ(TextOf(timeline.happenings().back()), "Grasper (tool 1) loses its hold");
 }
 
+TEST(Timeline, AnAssistantIsNotJudged) {
+  SceneView scene;
+  scene.assessment.limit[static_cast<std::size_t>(Measure::kPeakForce)] = 1.5f;
+  scene.physics.grip_force_N = 5;
+  const auto told = [&scene] {
+    Timeline timeline(test::kStart_ns, &scene);
+    for (const double time_s : {1.0, 1.01, 1.02}) timeline.Add(test::GraspAt(time_s, Vec3d::Zero(), 4, 5));
+    timeline.Add(test::ToolAt(1.03, Vec3d::Zero(), Vec3d::Zero()));
+    timeline.Add(test::PushAt(1.04, 1));  // The hold is lost.
+    return Told(timeline);
+  };
+  EXPECT_EQ(told(), "1.0-1.0 touch; 1.0-1.0 grasp; 1.0-1.0 force; 1.0-1.0 release; 1.0-1.0 touch; 1.0-1.0 slip; ");
+  scene.tools[0].traction_N = 1.7f;
+  EXPECT_EQ(told(), "1.0-1.0 touch; 1.0-1.0 grasp; 1.0-1.0 release; 1.0-1.0 touch; ");
+}
+
 TEST(Timeline, ItsLengthIsLimited) {
   Timeline timeline(test::kStart_ns);
   for (std::size_t i = 0; i < Timeline::kMost + 7; ++i) {
