@@ -161,8 +161,8 @@ std::string Plots(const SessionOutcome& outcome, const SessionRecord& record) {
     constexpr std::array kColours{"#1f6feb", "#bc4c00", "#8250df", "#1a7f37"};
     std::vector<PlotLine> lines;
     for (std::size_t i = 0; i < kMaxTools; ++i) {
-      const std::string tool = std::to_string(i);
-      PlotLine of_tool = line("tool " + tool, kColours[i % kColours.size()], force + tool + "_N");
+      PlotLine of_tool =
+          line("tool " + std::to_string(i + 1), kColours[i % kColours.size()], force + std::to_string(i) + "_N");
       if (!of_tool.curve->points().empty()) lines.push_back(std::move(of_tool));
     }
     return lines;

@@ -65,8 +65,8 @@ std::string SheetHtml(const ScoreSheet& sheet, const std::string& trainee) {
     return std::string("<td") + style + ">" + EscapeHtml(text) + "</td>";
   };
   const std::vector<std::size_t> tools = MeasuredTools(sheet.figures);
-  std::string tool_heads;
-  for (const std::size_t i : tools) tool_heads += "<th>tool " + std::to_string(i) + "</th>";
+  std::string tool_heads;  // People count from 1, as in picture, page and time line.
+  for (const std::size_t i : tools) tool_heads += "<th>tool " + std::to_string(i + 1) + "</th>";
   std::string html = "<h2>Score sheet" + (trainee.empty() ? std::string() : " of " + EscapeHtml(trainee)) + "</h2>\n" +
                      "<div class='tiles'><div class='tile'><b>" + Fixed(sheet.score.percent(), 0) +
                      " <small>%</small></b><span>" + Fixed(sheet.score.points, 1) + " of " + Fixed(sheet.score.of, 0) +

@@ -350,6 +350,7 @@ TEST(ReportTest, HoldsEverythingAndNothingFromElsewhere) {
   SessionRecord record;
   Health health = PhysicsHealth(1, 1, 3.25);
   health.metrics.push_back({"displacement_mm", 2});
+  health.metrics.push_back({"force0_N", 1});
   record.AddHealth(1, health);
   record.AddDeath(5.1, NodeId::kPhysics, "killed by signal 9 (Killed)", false);
   ThermalEvent event;
@@ -361,7 +362,7 @@ TEST(ReportTest, HoldsEverythingAndNothingFromElsewhere) {
   const std::string html = ReportHtml(outcome, record, folder.path());
   for (const char* part : {"&lt;tiny&gt;", "physics_node", "data:image/png;base64,", "data:video/mp4;base64,YSBjbGlw",
                            "<svg", "class='mark'", "killed by signal 9", "cut × 1", "✗ a fault &amp; its cause",
-                           "<td>3.5 s</td>", "a: &lt;b&gt;", "0:03 cut at 35 W", "data:text/vtt;base64,"}) {
+                           "<td>3.5 s</td>", "a: &lt;b&gt;", "tool 1", "0:03 cut at 35 W", "data:text/vtt;base64,"}) {
     EXPECT_NE(html.find(part), std::string::npos) << part;
   }
   for (const char* outside : {"http://", "https://", "src='/", "<script", "<link"}) {
