@@ -14,21 +14,21 @@ namespace {
 namespace fs = std::filesystem;
 namespace po = boost::program_options;
 
-constexpr double kShortest_min = 0.2, kLongest_min = 7 * 24 * 60;
+constexpr double kShortest_min = 0.2, kLongest_min = 24 * 60;  // That of a script.
 
 }  // namespace
 
 ExitCode Soak(const Words& words) {
   soak::SoakSettings settings;
   po::options_description options;
-  options.add_options()                                                                                               //
-      ("minutes", po::value<double>()->value_name("N")->default_value(10, "10"), "session time [min], 0.2 to 10080")  //
-      ("chaos", "kill and freeze nodes and occupy all processors at random times in the first two thirds")            //
-      ("seed", po::value<std::uint32_t>()->value_name("N")->default_value(1), "seed of the random faults")            //
-      ("most-growth", po::value<double>()->value_name("MB")->default_value(20, "20"),                                 //
-       "largest growth of the resident memory of one process [MB]; more fails the soak")                              //
-      ("record", "record all topics; needs about 4 MB of disk per second")                                            //
-      ("out", po::value<std::string>()->value_name("DIR")->default_value("out"), "folder in which soak/ is made")     //
+  options.add_options()                                                                                              //
+      ("minutes", po::value<double>()->value_name("N")->default_value(10, "10"), "session time [min], 0.2 to 1440")  //
+      ("chaos", "kill and freeze nodes and occupy all processors at random times in the first two thirds")           //
+      ("seed", po::value<std::uint32_t>()->value_name("N")->default_value(1), "seed of the random faults")           //
+      ("most-growth", po::value<double>()->value_name("MB")->default_value(20, "20"),                                //
+       "largest growth of the resident memory of one process [MB]; more fails the soak")                             //
+      ("record", "record all topics; needs about 4 MB of disk per second")                                           //
+      ("out", po::value<std::string>()->value_name("DIR")->default_value("out"), "folder in which soak/ is made")    //
       ("set", po::value<Words>()->value_name("SECTION.KEY=VALUE")->composing(),
        "replace a parameter of the scene; may be repeated");
   AddCart(&options);
@@ -41,7 +41,7 @@ ExitCode Soak(const Words& words) {
   settings.seed = values["seed"].as<std::uint32_t>();
   settings.limits.rss_growth_MB = values["most-growth"].as<double>();
   if (!(settings.minutes >= kShortest_min && settings.minutes <= kLongest_min)) {
-    throw InputError("--minutes " + Fixed(settings.minutes, 2) + ": must be 0.2 to 10080");
+    throw InputError("--minutes " + Fixed(settings.minutes, 2) + ": must be 0.2 to 1440");
   }
   settings.chaos = values.count("chaos") != 0;
   settings.domain = DomainOf(arguments);

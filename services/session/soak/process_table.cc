@@ -26,6 +26,22 @@ std::string StatusOf(const fs::path& process) {
   return text.str();
 }
 
+/// Time at which a process was started, in ticks of the kernel since its own start; nullopt when it has ended.
+/// Numbers of processes begin again at the small ones, so that they do not tell which is older.
+std::optional<std::uint64_t> StartOf(const fs::path& process) {
+  constexpr int kStart = 22, kAfterName = 3;  // Fields of proc(5), counted from 1.
+  std::ifstream in(process / "stat");
+  std::string line;
+  std::getline(in, line);
+  const std::size_t name_end = line.rfind(')');  // The name may contain anything.
+  if (name_end == std::string::npos) return {};
+  std::istringstream fields(line.substr(name_end + 1));
+  std::string field;
+  for (int i = kAfterName; i < kStart; ++i) fields >> field;
+  std::uint64_t start = 0;
+  return fields >> start ? std::optional(start) : std::nullopt;
+}
+
 bool IsZombie(const std::string& status) { return FieldOf(status, "State").starts_with("Z"); }
 
 }  // namespace
@@ -37,17 +53,26 @@ std::optional<std::uint64_t> ResidentBytes(pid_t process) {
   return std::stoull(resident) * 1024;
 }
 
-std::map<std::string, pid_t> ChildrenOf(pid_t parent) {
-  std::map<std::string, pid_t> children;
+std::map<std::string, pid_t> ChildrenOf(pid_t parent, const fs::path& processes) {
+  struct Child {
+    std::uint64_t start;
+    pid_t process;
+  };
+  std::map<std::string, Child> oldest;
   const std::string wanted = std::to_string(parent);
-  for (const auto& entry : fs::directory_iterator("/proc")) {
+  for (const auto& entry : fs::directory_iterator(processes)) {
     const std::string name = entry.path().filename();
     if (name.find_first_not_of("0123456789") != std::string::npos) continue;
     const std::string status = StatusOf(entry.path());
     if (FieldOf(status, "PPid") != wanted || IsZombie(status)) continue;
-    children.emplace(status.substr(status.find('\t') + 1, status.find('\n', 1) - status.find('\t') - 1),
-                     static_cast<pid_t>(std::stol(name)));
+    const std::optional<std::uint64_t> start = StartOf(entry.path());
+    if (!start) continue;  // It has just ended.
+    const Child child{*start, static_cast<pid_t>(std::stol(name))};
+    const auto [found, is_new] = oldest.emplace(FieldOf(status, "Name"), child);
+    if (!is_new && child.start < found->second.start) found->second = child;
   }
+  std::map<std::string, pid_t> children;
+  for (const auto& [program, child] : oldest) children.emplace(program, child.process);
   return children;
 }
 

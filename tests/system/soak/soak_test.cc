@@ -28,6 +28,14 @@ TEST(Soak, BlowsAreSurvivedAndTold) {
   fs::remove_all(Out());
 }
 
+TEST(Soak, ALengthBeyondThatOfAScriptIsRefusedByItsName) {
+  fulcrum::testing::Program soak("fulcrum", {"soak", "small", "--minutes", "1441", "--domain", "58", "--out", Out()});
+  std::optional<int> code;
+  ASSERT_TRUE(fulcrum::testing::WaitFor(20, [&] { return (code = soak.Poll()).has_value(); })) << soak.Said();
+  EXPECT_EQ(*code, 2);
+  EXPECT_NE(soak.Said().find("--minutes 1441.00: must be 0.2 to 1440"), std::string::npos) << soak.Said();
+}
+
 TEST(Soak, ANodeThatEndsByItselfIsACrash) {
   fs::remove_all(Out());
   fulcrum::testing::Program soak("fulcrum", {"soak", "small", "--minutes", "0.2", "--domain", "58", "--out", Out()});

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <set>
 
 #include "services/base/runtime/child_process.h"
@@ -101,6 +103,27 @@ TEST(ProcessTable, KnowsChildrenAndWhatTheyHold) {
   child.Signal(SIGKILL);
   while (ChildrenOf(::getpid()).contains("sleep")) ::usleep(1000);
   EXPECT_FALSE(ResidentBytes(child.pid()).has_value()) << "it is a zombie";
+}
+
+TEST(ProcessTable, TheNodeIsOlderThanItsSpareWhateverTheirNumbers) {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("process_table_test." + std::to_string(::getpid()));
+  // Numbers of processes have wrapped: the spare of the node 30001 is 301, that of 302 is 30002.
+  const auto add = [&](int process, const std::string& name, int start) {
+    const std::filesystem::path at = folder / std::to_string(process);
+    std::filesystem::create_directories(at);
+    std::ofstream(at / "status") << "Name:\t" << name << "\nState:\tS (sleeping)\nPPid:\t7\n";
+    std::ofstream(at / "stat") << process << " (" << name << ") S 7 1 1 0 -1 4194304 9 8 7 6 5 4 3 2 20 0 12 0 "
+                               << start << " 1000 250\n";
+  };
+  add(301, "render_node", 900);
+  add(30001, "render_node", 100);
+  add(302, "odd ) name", 100);
+  add(30002, "odd ) name", 900);
+  const std::map<std::string, pid_t> expected{{"render_node", 30001}, {"odd ) name", 302}};
+  EXPECT_EQ(ChildrenOf(7, folder), expected);
+  EXPECT_TRUE(ChildrenOf(8, folder).empty());
+  std::filesystem::remove_all(folder);
 }
 
 TEST(ProcessTable, ProcessorsGoOnCounting) {
