@@ -7,11 +7,10 @@
 #include <X11/keysym.h>
 
 #include <array>
-#include <map>
 #include <memory>
-#include <optional>
 
 #include "render_node/input/pad_inputs.h"
+#include "render_node/input/window_keys.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/cyclic_thread.h"
 
@@ -19,18 +18,6 @@ namespace fulcrum::render {
 namespace {
 
 constexpr unsigned kPointerEvents = ButtonPressMask | ButtonReleaseMask | PointerMotionMask;
-
-std::optional<HandsKey> KeyOf(KeySym symbol) {
-  static const std::map<KeySym, HandsKey> kKeys{
-      {XK_1, HandsKey::kTool0},         {XK_2, HandsKey::kTool1},      {XK_3, HandsKey::kTool2},
-      {XK_4, HandsKey::kTool3},         {XK_q, HandsKey::kRollLeft},   {XK_e, HandsKey::kRollRight},
-      {XK_j, HandsKey::kJaw},           {XK_k, HandsKey::kJawLock},    {XK_f, HandsKey::kCut},
-      {XK_g, HandsKey::kCoag},          {XK_space, HandsKey::kClutch}, {XK_Control_L, HandsKey::kDepth},
-      {XK_Control_R, HandsKey::kDepth}, {XK_Shift_L, HandsKey::kFine}, {XK_Shift_R, HandsKey::kFine},
-      {XK_v, HandsKey::kSteady}};
-  const auto found = kKeys.find(symbol);
-  return found == kKeys.end() ? std::nullopt : std::optional(found->second);
-}
 
 // Xlib has one handler of errors for all connections of a process.
 ::Display* g_own = nullptr;
@@ -124,7 +111,10 @@ class WindowInput::Connection {
   }
 
   bool HandleKey(const XKeyEvent& event, bool down, MouseHands* hands, bool* take) {
-    const KeySym symbol = XkbKeycodeToKeysym(display_, static_cast<KeyCode>(event.keycode), 0, 0);
+    const auto code = static_cast<KeyCode>(event.keycode);
+    const std::array<KeySym, 2> symbols{XkbKeycodeToKeysym(display_, code, 0, 0),
+                                        XkbKeycodeToKeysym(display_, code, 0, 1)};
+    const KeySym symbol = symbols.front();
     if (!hands->active()) {
       if (symbol == XK_Return && down) *take = true;
       return false;
@@ -133,7 +123,7 @@ class WindowInput::Connection {
       Release(hands);
       return true;
     }
-    const auto key = KeyOf(symbol);
+    const auto key = HandsKeyOf(symbols);
     if (key) hands->Press(*key, down);
     return key.has_value();
   }
