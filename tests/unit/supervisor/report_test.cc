@@ -351,6 +351,7 @@ TEST(ReportTest, HoldsEverythingAndNothingFromElsewhere) {
   Health health = PhysicsHealth(1, 1, 3.25);
   health.metrics.push_back({"displacement_mm", 2});
   health.metrics.push_back({"force0_N", 1});
+  health.metrics.push_back({"force1_N", 2});
   record.AddHealth(1, health);
   record.AddDeath(5.1, NodeId::kPhysics, "killed by signal 9 (Killed)", false);
   ThermalEvent event;
@@ -360,9 +361,10 @@ TEST(ReportTest, HoldsEverythingAndNothingFromElsewhere) {
   outcome.recording = folder.path() / "recording.mcap";
   outcome.video = {.file = folder.path() / "video.mp4", .chapters = {"0:03 cut at 35 W"}, .subtitles = "WEBVTT\n"};
   const std::string html = ReportHtml(outcome, record, folder.path());
-  for (const char* part : {"&lt;tiny&gt;", "physics_node", "data:image/png;base64,", "data:video/mp4;base64,YSBjbGlw",
-                           "<svg", "class='mark'", "killed by signal 9", "cut × 1", "✗ a fault &amp; its cause",
-                           "<td>3.5 s</td>", "a: &lt;b&gt;", "tool 1", "0:03 cut at 35 W", "data:text/vtt;base64,"}) {
+  for (const char* part :
+       {"&lt;tiny&gt;", "physics_node", "data:image/png;base64,", "data:video/mp4;base64,YSBjbGlw", "<svg",
+        "class='mark'", "killed by signal 9", "cut × 1", "✗ a fault &amp; its cause", "<td>3.5 s</td>", "a: &lt;b&gt;",
+        ">tool 1<", ">tool 2<", "0:03 cut at 35 W", "data:text/vtt;base64,"}) {
     EXPECT_NE(html.find(part), std::string::npos) << part;
   }
   for (const char* outside : {"http://", "https://", "src='/", "<script", "<link"}) {
