@@ -27,11 +27,17 @@ ExitCode RunRender(app::NodeApp& app) {
   // Collected before the ports start the threads of the bus: those that draw, this one and the rasteriser's.
   const std::vector<int> drawing = render::ThreadsOfProcess();
   bus::Output<OperatorInput>* const operated = hands ? &app.MakeOutput<OperatorInput>() : nullptr;
-  const render::RenderPorts ports{app.MakeInput<TissueFrame>(),      app.MakeInput<TopologyState>(),
-                                  app.MakeInput<TemperaturePatch>(), app.MakeInput<ToolState>(),
-                                  app.MakeInput<HandleState>(),      app.MakeInput<ThermalEvent>(),
-                                  app.MakeInput<CauteryContact>(),   app.MakeInput<GeneratorSetting>(),
-                                  app.MakeInput<ContactModel>(),     operated,
+  const render::RenderPorts ports{app.MakeInput<TissueFrame>(),
+                                  app.MakeInput<TopologyState>(),
+                                  app.MakeInput<TemperaturePatch>(),
+                                  app.MakeInput<ToolState>(),
+                                  app.MakeInput<HandleState>(),
+                                  app.MakeInput<ThermalEvent>(),
+                                  app.MakeInput<CauteryContact>(),
+                                  app.MakeInput<GeneratorSetting>(),
+                                  app.MakeInput<ContactModel>(),
+                                  app.MakeInput<ClipState>(),
+                                  operated,
                                   &app.MakeOutput<Picture>()};
   render::LowerPriority(drawing);
   render::RenderNode node(app.scene(), settings, ports, std::move(stage));

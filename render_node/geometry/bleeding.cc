@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
-
-#include "render_node/geometry/texel.h"
+#include <vector>
 
 namespace fulcrum::render {
 namespace {
@@ -26,31 +26,44 @@ constexpr float kSameVessel_m = 0.006f;
 
 Bleeding::Bleeding(const SceneView& scene, std::span<const std::uint8_t> vessels, int texels, float per_m,
                    std::span<const float> rim)
-    : scene_(scene), vessels_(vessels), texels_(texels), per_m_(per_m), fluid_(scene, rim) {}
+    : scene_(scene), supply_(scene, vessels, texels, per_m), fluid_(scene, rim) {}
 
-float Bleeding::VesselAt(const Vec2f& material) const {
-  const auto wrapped = [this](float metres) {
-    const float place = metres * per_m_;
-    return std::min(texels_ - 1, static_cast<int>((place - std::floor(place)) * static_cast<float>(texels_)));
+std::optional<Vec2f> Bleeding::LivingVessel(const Vec2f& material, const Atlas& atlas) {
+  struct Place {
+    Vec2f material;
+    float strength;
   };
-  return static_cast<float>(vessels_[4 * TexelIndex(wrapped(material.x()), wrapped(material.y()), texels_) + 3]) / 255;
-}
-
-std::optional<Vec2f> Bleeding::LivingVessel(const Vec2f& material, const Atlas& atlas) const {
-  std::optional<Vec2f> best;
-  float strongest = kVessel;
+  std::vector<Place> found;
   for (const float radius : kRimRadii) {
     for (int k = 0; k < kRim; ++k) {
       const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(k) / kRim;
       const Vec2f place = material + radius * Vec2f(std::cos(angle), std::sin(angle));
       const auto texel = atlas.At(place);
-      if (texel && (*texel)[3] >= 128 && (*texel)[1] < kSealed && VesselAt(place) > strongest) {
-        strongest = VesselAt(place);
-        best = place;
-      }
+      const float strength = supply_.VesselAt(place);
+      if (texel && (*texel)[3] >= 128 && (*texel)[1] < kSealed && strength > kVessel)
+        found.push_back({place, strength});
     }
   }
-  return best;
+  std::ranges::stable_sort(found, std::greater(), &Place::strength);
+  const auto best = std::ranges::find_if(found, [&](const Place& p) { return !supply_.CutOff(p.material, atlas); });
+  return best == found.end() ? std::nullopt : std::optional(best->material);
+}
+
+void Bleeding::SetClips(std::span<const Clip> clips) {
+  supply_.SetClips(clips);
+  clips_changed_ = true;
+}
+
+void Bleeding::StopCutOff(const Atlas& atlas) {
+  if (!clips_changed_ && atlas.removals() == removals_) return;
+  clips_changed_ = false;
+  removals_ = atlas.removals();
+  for (Source& source : sources_) {
+    if (!source.open || !supply_.CutOff(source.material, atlas)) continue;
+    const std::optional<Vec2f> other = LivingVessel(source.material, atlas);
+    source.open = other.has_value();
+    if (other) source.material = *other;
+  }
 }
 
 void Bleeding::Cut(const Vec2f& material, const Atlas& atlas, double session_time_s) {
@@ -75,6 +88,7 @@ bool Bleeding::Update(double session_time_s, const MembraneMesh& membrane, std::
     time_s_ = session_time_s;
     return false;
   }
+  if (supply_.has_clips()) StopCutOff(*atlas);
   fluid_.SetShape(membrane, atlas);
   static_assert(kMostSteps > kStepsOfAge);
   time_s_ = std::max(time_s_, session_time_s - kMostSteps * SheetFluid::kStep_s);

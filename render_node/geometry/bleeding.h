@@ -11,6 +11,7 @@
 #include "render_node/geometry/atlas.h"
 #include "render_node/geometry/membrane_mesh.h"
 #include "render_node/geometry/sheet_fluid.h"
+#include "render_node/geometry/vessel_supply.h"
 
 namespace fulcrum::render {
 
@@ -21,6 +22,10 @@ class Bleeding {
   /// the rim and the arrays of `scene`.
   Bleeding(const SceneView& scene, std::span<const std::uint8_t> vessels, int texels, float per_m,
            std::span<const float> rim = {});
+
+  /// Replaces the clips: a vessel that they cut off (geometry/vessel_supply.h) does not bleed, or stops with the next
+  /// Update. One that is free again does not bleed until it is cut again. @pre anchors are vertices of the scene.
+  void SetClips(std::span<const Clip> clips);
 
   /// Registers a cut at `material` [m]: a vessel that ends at its rim in living tissue begins to bleed.
   void Cut(const Vec2f& material, const Atlas& atlas, double session_time_s);
@@ -49,15 +54,16 @@ class Bleeding {
     int steps = 0;        // Steps since it opened.
     double opened_s = 0;  // Session time of the cut [s].
   };
-  [[nodiscard]] float VesselAt(const Vec2f& material) const;
-  /// The strongest vessel in living tissue beside a place; none if there is none.
-  [[nodiscard]] std::optional<Vec2f> LivingVessel(const Vec2f& material, const Atlas& atlas) const;
+  /// The strongest vessel in living tissue beside a place that is not cut off; none if there is none.
+  [[nodiscard]] std::optional<Vec2f> LivingVessel(const Vec2f& material, const Atlas& atlas);
+  /// Closes the sources that clips have cut off; a vessel has two ends at a cut, of which the other one may go on.
+  void StopCutOff(const Atlas& atlas);
   void Bleed(Source* source, const Atlas& atlas);
 
   SceneView scene_;
-  std::span<const std::uint8_t> vessels_;
-  int texels_;
-  float per_m_;
+  VesselSupply supply_;
+  bool clips_changed_ = false;
+  std::uint64_t removals_ = 0;  // Of the atlas when clips were last taken into account.
   SheetFluid fluid_;
   std::array<Source, 8> sources_;
   std::size_t next_source_ = 0;

@@ -10,8 +10,9 @@ namespace {
 constexpr Colour kSteel{0.42f, 0.44f, 0.46f, 1.0f};
 constexpr Colour kPolishedSteel{0.60f, 0.61f, 0.63f, 1.0f};
 constexpr Colour kInsulation{0.012f, 0.012f, 0.014f, 0.25f};
-constexpr Colour kTube{0.26f, 0.27f, 0.29f, 1.0f};      // Brushed steel.
-constexpr Colour kBore{0.006f, 0.005f, 0.005f, 0.05f};  // The dark within a tube.
+constexpr Colour kTitanium{0.62f, 0.63f, 0.66f, 0.85f};  // Matt.
+constexpr Colour kTube{0.26f, 0.27f, 0.29f, 1.0f};       // Brushed steel.
+constexpr Colour kBore{0.006f, 0.005f, 0.005f, 0.05f};   // The dark within a tube.
 constexpr Colour kCeramic{0.70f, 0.67f, 0.60f, 0.10f};
 
 void AppendQuadFace(const std::array<Vec3f, 4>& corners, const Colour& colour, Solid* solid) {
@@ -167,6 +168,87 @@ Solid ScissorBlade(const ToolShape& shape) {
     outlines.push_back({{0, bow - w, z}, {h, bow - w, z}, {0.8f * h, bow + w, z}, {0, bow + w, z}});
   }
   AppendLoft(outlines, kPolishedSteel, &solid);
+  return solid;
+}
+
+Solid ClipApplierShaft(const ToolShape& shape) {
+  Solid solid;
+  const float hinge = -shape.tip_length_m, r = shape.shaft_radius_m;
+  AppendStraightTube(-shape.shaft_length_m, hinge - 0.006f, r, r, 24, kTube, &solid);
+  // The collar that closes the jaws, and the dark within it.
+  const std::array<Vec3f, 4> path{Vec3f(0, 0, hinge - 0.006f), Vec3f(0, 0, hinge - 0.0055f),
+                                  Vec3f(0, 0, hinge - 0.001f), Vec3f(0, 0, hinge)};
+  const std::array<float, 4> radii{r, 1.02f * r, 1.02f * r, 0.8f * r};
+  AppendTube(path, radii, 24, kSteel, &solid);
+  AppendStraightTube(hinge, hinge + 2e-5f, 0.7f * r, 0.7f * r, 24, kBore, &solid);
+  return solid;
+}
+
+Solid ClipApplierJaw(const ToolShape& shape) {
+  Solid solid;
+  const float length = shape.tip_length_m, r = shape.tip_radius_m;
+  const float groove = 0.4f * r;  // Half of its width.
+  constexpr float kApart = 5e-5f;
+  struct Section {
+    float u, width, height, depth;  // Place along the jaw, half width, height and depth of the groove.
+  };
+  // A springy arm, then the jaw with parallel sides, rounded at its end. The groove is closed at both ends.
+  const std::array<Section, 9> sections{{{-0.25f, 0.50f * r, 0.55f * r, 0},
+                                         {0.12f, 0.50f * r, 0.55f * r, 0},
+                                         {0.20f, 0.85f * r, 0.80f * r, 0},
+                                         {0.24f, 0.85f * r, 0.80f * r, 0},
+                                         {0.25f, 0.85f * r, 0.80f * r, 0.35f * r},
+                                         {0.95f, 0.85f * r, 0.80f * r, 0.35f * r},
+                                         {0.955f, 0.82f * r, 0.76f * r, 0},
+                                         {0.98f, 0.70f * r, 0.62f * r, 0},
+                                         {1.00f, 0.45f * r, 0.40f * r, 0}}};
+  std::vector<std::vector<Vec3f>> outlines;
+  for (const Section& s : sections) {
+    const float z = s.u * length, w = s.width, h = kApart + s.height, g = std::min(groove, 0.8f * w);
+    const float corner = 0.45f * std::min(s.width, s.height);
+    outlines.push_back({{kApart, -w, z},
+                        {h - corner, -w, z},
+                        {h - 0.3f * corner, -w + 0.3f * corner, z},
+                        {h, -w + corner, z},
+                        {h, w - corner, z},
+                        {h - 0.3f * corner, w - 0.3f * corner, z},
+                        {h - corner, w, z},
+                        {kApart, w, z},
+                        {kApart, g, z},
+                        {kApart + s.depth, g, z},
+                        {kApart + s.depth, -g, z},
+                        {kApart, -g, z}});
+  }
+  AppendLoft(outlines, kPolishedSteel, &solid);
+  // The leg of the next clip stands out of the groove.
+  const std::array<Vec3f, 4> leg{Vec3f(0, 0, 0.27f * length), Vec3f(0, 0, 0.3f * length), Vec3f(0, 0, 0.91f * length),
+                                 Vec3f(0, 0, 0.93f * length)};
+  std::array<Vec3f, 4> path;
+  std::ranges::transform(leg, path.begin(), [r](const Vec3f& p) { return Vec3f(p + Vec3f(0.15f * r, 0, 0)); });
+  const std::array<float, 4> radii{0.25f * r, 0.36f * r, 0.36f * r, 0.25f * r};
+  AppendTube(path, radii, 10, kTitanium, &solid);
+  return solid;
+}
+
+Solid TitaniumClip(float length_m) {
+  constexpr float kThick = 0.001f, kBetween = 0.0002f;  // Of a leg; from leg to leg [m].
+  constexpr float kEye = 0.0007f;                       // Radius of the bend's middle line: wider than the legs.
+  constexpr int kArc = 12;
+  const float end = 0.5f * std::max(length_m, 4 * kThick), x = 0.5f * (kThick + kBetween);
+  const float centre = -end + 0.5f * kThick + kEye, from = std::acos(x / kEye);
+  // One leg, from its open end, the bend, and the other leg.
+  std::vector<Vec3f> path{{x, 0, end}, {x, 0, end - 0.1e-3f}, {x, 0, end - 0.3e-3f}};
+  for (int k = 0; k <= kArc; ++k) {
+    const float share = static_cast<float>(k) / kArc;
+    const float angle = from - share * (std::numbers::pi_v<float> + 2 * from);
+    path.emplace_back(kEye * std::cos(angle), 0, centre + kEye * std::sin(angle));
+  }
+  for (const float below : {0.3e-3f, 0.1e-3f, 0.0f}) path.emplace_back(-x, 0, end - below);
+  std::vector<float> radii(path.size(), 0.5f * kThick);
+  radii.front() = radii.back() = 0.3f * kThick;
+  radii[1] = radii[radii.size() - 2] = 0.45f * kThick;
+  Solid solid;
+  AppendTube(path, radii, 12, kTitanium, &solid);
   return solid;
 }
 

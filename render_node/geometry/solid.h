@@ -41,6 +41,13 @@ struct ToolShape {
 [[nodiscard]] Solid GrasperJaw(const ToolShape& shape);
 /// Blade of scissors, curved and pointed; placed like GrasperJaw.
 [[nodiscard]] Solid ScissorBlade(const ToolShape& shape);
+/// Clip applier: a tube of brushed steel without insulation, up to its jaws.
+[[nodiscard]] Solid ClipApplierShaft(const ToolShape& shape);
+/// Jaw of a clip applier, slim and parallel-sided, with a leg of the next clip in its groove; placed like GrasperJaw.
+[[nodiscard]] Solid ClipApplierJaw(const ToolShape& shape);
+/// A closed clip in frame C (idl/clip.idl): two legs of 1 mm, joined by a round bend. @param length_m at least 4 mm are
+/// drawn.
+[[nodiscard]] Solid TitaniumClip(float length_m);
 /// Suction and irrigation tube: straight, of steel, with an open end at the origin and two rings of side holes behind
 /// it.
 [[nodiscard]] Solid SuctionTube(const ToolShape& shape);

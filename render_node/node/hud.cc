@@ -113,6 +113,11 @@ std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
       texts.push_back({Corner::kTopLeft, ++line, std::string(key)});
     }
   }
+  if (state.help && state.hands && state.clip_applier) {
+    for (const std::string_view key : {"CLIP APPLIER: CLOSE THE JAW: CLIP", "OPEN IT: LET GO"}) {
+      texts.push_back({Corner::kTopLeft, ++line, std::string(key)});
+    }
+  }
   if (state.help) {
     for (const std::string_view key :
          {"ARROWS TURN", "+ - NEARER, FARTHER", "R T ROLL", "0 RESET VIEW", "L LOCK ON TOOL", "S SCREENSHOT", "P PAUSE",
@@ -145,8 +150,9 @@ std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
     texts.push_back({Corner::kBottomRight, line++, Number("SLIT %.0f mm", 1000.0 * state.slit_m)});
   }
   if (state.tip_C) {
-    texts.push_back({Corner::kBottomRight, line, Number("TIP %.0f °C", *state.tip_C)});
+    texts.push_back({Corner::kBottomRight, line++, Number("TIP %.0f °C", *state.tip_C)});
   }
+  if (state.clips > 0) texts.push_back({Corner::kBottomRight, line, Number("CLIPS %.0f", state.clips)});
   return texts;
 }
 

@@ -27,6 +27,8 @@ struct HudState {
   std::array<bool, kMaxTools> assists{};                ///< Held for the trainee: its bar is never a warning.
   std::optional<float> tip_C;  ///< Hottest texel of the newest patch; no value once the patch is old.
   float slit_m = 0;
+  int clips = 0;              ///< On the tissue.
+  bool clip_applier = false;  ///< The scene has one.
   Alarm ureter = Alarm::kNone, nerve = Alarm::kNone;
   std::vector<std::string> late;  ///< Texts for inputs that are late, such as "TISSUE HELD".
   float soil = 0;                 ///< Of the lens.

@@ -48,6 +48,7 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
       figures_(scene.render.hud != 0) {
   view_.SetMostScale(quality_.most());
   hud_.tube = FindTool(scene.tools, ToolKind::kSuction).has_value();
+  hud_.clip_applier = FindTool(scene.tools, ToolKind::kClipApplier).has_value();
   if (ports_.operator_input == nullptr) return;
   const auto write = [this](const OperatorInput& input) {
     OperatorInput stamped = input;
@@ -75,6 +76,7 @@ void RenderNode::Step(const Tick& tick) {
     PassOver();
   } else {
     TakeTissue();
+    TakeClips();
     TakeThermal();
     TakeEvents();
     TakeTools();
@@ -159,6 +161,28 @@ void RenderNode::TakeTissue() {
   if (view_.SetBreath(tissue_.header.simulated_time_s) || moved) {
     changed_on_screen_ = changed_in_file_ = true;
   }
+}
+
+void RenderNode::TakeClips() {
+  if (!ports_.clips.TakeLatest(&clips_)) return;
+  if (clips_.scene_hash != scene_.hash) {
+    Report("ClipState of another scene dropped");
+    return;
+  }
+  std::vector<Clip> on_tissue;
+  for (const Clip& clip : std::span(clips_.clips).first(clips_.count)) {
+    const bool known =
+        std::ranges::all_of(clip.anchors, [this](std::uint32_t v) { return v < scene_.rest_position.size(); });
+    if (known) {
+      on_tissue.push_back(clip);
+    } else {
+      clips_dropped_.fetch_add(1, std::memory_order_relaxed);
+      Report("clip on a vertex that the scene does not have");
+    }
+  }
+  hud_.clips = static_cast<int>(on_tissue.size());
+  view_.SetClips(on_tissue);
+  changed_on_screen_ = changed_in_file_ = true;
 }
 
 // Samples that wait too long unread would count as lost. Of the streams the newest is read after the pause, but each
@@ -431,6 +455,9 @@ void RenderNode::Report(const std::string& error) {
 void RenderNode::FillHealth(Health* health) const {
   health->metrics.push_back({"frames_drawn", static_cast<double>(frames_drawn_.load(std::memory_order_relaxed))});
   health->metrics.push_back({"draw_ms", draw_ms_.load(std::memory_order_relaxed)});
+  if (const std::uint64_t refused = clips_dropped_.load(std::memory_order_relaxed)) {
+    health->metrics.push_back({"clips_dropped", static_cast<double>(refused)});
+  }
   runtime::AddQuantiles("motion_to_picture", motion_to_picture_.snapshot(), health);
   health->metrics.push_back({"scale", scale_.load(std::memory_order_relaxed)});
   health->metrics.push_back({"patches", static_cast<double>(patches_applied_.load(std::memory_order_relaxed))});

@@ -37,7 +37,8 @@ struct RenderPorts {
   bus::Input<ThermalEvent>& events;
   bus::Input<CauteryContact>& contacts;
   bus::Input<GeneratorSetting>& generator;
-  bus::Input<ContactModel>& contact_models;      ///< For the force of the tissue on the tools.
+  bus::Input<ContactModel>& contact_models;  ///< For the force of the tissue on the tools.
+  bus::Input<ClipState>& clips;
   bus::Output<OperatorInput>* operator_input;    ///< Null: the window operates nothing.
   bus::LoanOutput<Picture>* pictures = nullptr;  ///< Null: no live pictures.
 };
@@ -111,6 +112,7 @@ class RenderNode {
   /// Instead of what follows while the picture is paused.
   void PassOver();
   void Apply(const TemperaturePatch& patch);
+  void TakeClips();
   void TakeThermal();
   void TakeTools();
   void TakeHandles();
@@ -169,6 +171,7 @@ class RenderNode {
 
   TissueFrame tissue_, new_tissue_;
   TopologyState topology_;
+  ClipState clips_;
   TemperaturePatch patch_;
   std::map<PatchPlace, TemperaturePatch> held_patches_;  // During a pause.
   ToolState tools_, new_tools_;
@@ -211,6 +214,7 @@ class RenderNode {
   // Read by the health thread; the values are independent, so relaxed order is enough.
   std::atomic<std::uint64_t> frames_drawn_{0};
   std::atomic<std::uint64_t> patches_applied_{0};
+  std::atomic<std::uint64_t> clips_dropped_{0};
   std::atomic<double> draw_ms_{0};
   runtime::Histogram motion_to_picture_;
   std::atomic<double> scale_{1};

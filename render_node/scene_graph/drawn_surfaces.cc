@@ -19,9 +19,9 @@
 namespace fulcrum::render {
 namespace {
 
-constexpr std::array<std::string_view, 12> kSurfaces{"rectum",  "organ",        "fat",       "membrane",
-                                                     "cut",     "surroundings", "breathing", "hook",
-                                                     "grasper", "jaw",          "blade",     "instrument"};
+constexpr std::array<std::string_view, 14> kSurfaces{"rectum", "organ",      "fat",          "membrane", "cut",
+                                                     "clip",   "tube",       "hook",         "grasper",  "jaw",
+                                                     "blade",  "instrument", "surroundings", "breathing"};
 constexpr std::array<std::string_view, 1> kBurns{"burn"};
 
 class Collector final : public osg::NodeVisitor {

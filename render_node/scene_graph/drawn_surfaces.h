@@ -15,7 +15,7 @@ namespace fulcrum::render {
 
 struct DrawnSurface {
   std::string name;  ///< "rectum", "organ" (a solid of another look), "fat", "membrane", "cut" (its lips),
-                     ///< "surroundings", "breathing", "burn", or the part of a tool.
+                     ///< "clip", "surroundings", "breathing", "burn", or the part of a tool.
   int tool = -1;     ///< Tool that it is part of; -1: tissue.
   int part = 0;      ///< Counts the surfaces of one name and tool.
   std::vector<Vec3d> positions_W;

@@ -67,9 +67,9 @@ void Instruments::Build(const ToolDescription& tool, Instrument* instrument) {
   };
   if (tool.kind == ToolKind::kHook) return set_body(Hook(shape), "hook");
   if (tool.kind == ToolKind::kSuction) return set_body(SuctionTube(shape), "tube");
-  set_body(GrasperShaft(shape), "grasper");
-  const bool scissors = tool.kind == ToolKind::kScissors;
-  const Solid half = scissors ? ScissorBlade(shape) : GrasperJaw(shape);
+  const bool scissors = tool.kind == ToolKind::kScissors, applier = tool.kind == ToolKind::kClipApplier;
+  set_body(applier ? ClipApplierShaft(shape) : GrasperShaft(shape), "grasper");
+  const Solid half = applier ? ClipApplierJaw(shape) : scissors ? ScissorBlade(shape) : GrasperJaw(shape);
   const osg::ref_ptr<osg::Geometry> jaw = ToGeometry(half, scissors ? "blade" : "jaw");
   instrument->jaw_edges.fill(EdgesOf(half));
   const osg::Matrix to_hinge = osg::Matrix::translate(0, 0, -tool.tip_length_m);

@@ -15,6 +15,7 @@
 #include "render_node/geometry/tissue_pattern.h"
 #include "render_node/geometry/tool_shadow.h"
 #include "render_node/scene_graph/atlas_texture.h"
+#include "render_node/scene_graph/clips.h"
 #include "render_node/scene_graph/instruments.h"
 #include "render_node/scene_graph/optics.h"
 #include "render_node/scene_graph/order.h"
@@ -75,6 +76,7 @@ struct LaparoscopeView::Impl {
   TissueLayers layers;
   Surroundings surroundings;
   Instruments instruments;
+  Clips clips;
   ToolShadow shadow;
   Mesh shadow_mesh{"shadow", true};
   std::array<ToolSample, kMaxTools> tools{};
@@ -116,6 +118,7 @@ LaparoscopeView::Impl::Impl(const SceneView& view, const Look& given)
       overlay(view.stereo.layout, static_cast<int>(view.render.width), static_cast<int>(view.render.height)),
       optics(view.stereo.layout, eyes, static_cast<int>(view.render.width), static_cast<int>(view.render.height),
              surroundings.fixed(), scene_root) {
+  instruments.node()->addChild(clips.node());
   DrawIn(Order::kInstruments, instruments.node()->getOrCreateStateSet());
   shadow_mesh.state()->setAttributeAndModes(MakeProgram("shadow.vert", "shadow.frag"));
   DrawIn(Order::kShadow, shadow_mesh.state());
@@ -276,6 +279,13 @@ void LaparoscopeView::SetJaw(int tool, float angle_rad) {
   impl_->optics.EdgesChanged();
 }
 
+void LaparoscopeView::SetClips(std::span<const Clip> clips) {
+  impl_->clips.Set(clips);
+  impl_->clips.Follow(impl_->layers.particles());
+  impl_->bleeding.SetClips(clips);
+  impl_->optics.EdgesChanged();
+}
+
 void LaparoscopeView::SetFlow(int tool, TubeFlow flow, double session_time_s) {
   TubeFlow& now = impl_->flows[static_cast<std::size_t>(tool)];
   if (now == flow) return;
@@ -324,10 +334,10 @@ void LaparoscopeView::SetSmoothEdges(bool on) {
   if (on == impl_->smooths_edges) return;
   impl_->smooths_edges = on;
   if (!on) return impl_->optics.SetEdges({});
-  impl_->optics.SetEdges(
-      [instruments = &impl_->instruments](const Laparoscope& eye, const Vec2f& size, std::vector<EdgeLine>* lines) {
-        instruments->AppendEdges(eye, size, lines);
-      });
+  impl_->optics.SetEdges([impl = impl_.get()](const Laparoscope& eye, const Vec2f& size, std::vector<EdgeLine>* lines) {
+    impl->instruments.AppendEdges(eye, size, lines);
+    impl->clips.AppendEdges(eye, size, lines);
+  });
 }
 
 bool LaparoscopeView::Refine() { return impl_->optics.Refine(); }
@@ -339,6 +349,10 @@ void LaparoscopeView::Update() {
   if (impl_->layers.Update(impl_->atlas)) {
     impl_->optics.SceneChanged();
     impl_->tools_moved = true;
+    if (!impl_->clips.empty()) {
+      impl_->clips.Follow(impl_->layers.particles());
+      impl_->optics.EdgesChanged();
+    }
   }
   if (impl_->tools_moved) {
     impl_->CastShadows();

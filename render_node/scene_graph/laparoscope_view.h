@@ -33,6 +33,8 @@ class LaparoscopeView {
   bool ApplyPatch(const TemperaturePatch& patch);
   void SetTool(int tool, const ToolSample& sample);
   void SetJaw(int tool, float angle_rad);
+  /// Replaces the clips on the tissue. @pre anchors are vertices of the scene.
+  void SetClips(std::span<const Clip> clips);
   /// What a suction and irrigation tube does from this time on.
   void SetFlow(int tool, TubeFlow flow, double session_time_s);
   /// A tube aspirates or irrigates: UpdateEffects must be called at each step, so that poses count when they come.

@@ -43,7 +43,7 @@ class Feed {
 
 using Feeds =
     std::tuple<Feed<TissueFrame>, Feed<TopologyState>, Feed<TemperaturePatch>, Feed<ToolState>, Feed<HandleState>,
-               Feed<ThermalEvent>, Feed<CauteryContact>, Feed<GeneratorSetting>, Feed<ContactModel>>;
+               Feed<ThermalEvent>, Feed<CauteryContact>, Feed<GeneratorSetting>, Feed<ContactModel>, Feed<ClipState>>;
 
 template <class T>
 bus::Input<T>& InputIn(Feeds& feeds) {
@@ -51,11 +51,17 @@ bus::Input<T>& InputIn(Feeds& feeds) {
 }
 
 render::RenderPorts PortsOf(Feeds& feeds) {
-  return {InputIn<TissueFrame>(feeds),      InputIn<TopologyState>(feeds),
-          InputIn<TemperaturePatch>(feeds), InputIn<ToolState>(feeds),
-          InputIn<HandleState>(feeds),      InputIn<ThermalEvent>(feeds),
-          InputIn<CauteryContact>(feeds),   InputIn<GeneratorSetting>(feeds),
-          InputIn<ContactModel>(feeds),     nullptr};
+  return {InputIn<TissueFrame>(feeds),
+          InputIn<TopologyState>(feeds),
+          InputIn<TemperaturePatch>(feeds),
+          InputIn<ToolState>(feeds),
+          InputIn<HandleState>(feeds),
+          InputIn<ThermalEvent>(feeds),
+          InputIn<CauteryContact>(feeds),
+          InputIn<GeneratorSetting>(feeds),
+          InputIn<ContactModel>(feeds),
+          InputIn<ClipState>(feeds),
+          nullptr};
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Draws a picture for a developer without the cart:
 //
 //   render_preview built-in|small|FILE.scene TIME_s OUT.png [TIP_x TIP_y TIP_z TARGET_x TARGET_y TARGET_z [BLEEDS_s]]
+//   render_preview built-in clipped OUT.png [FIELD_deg]      (two clips on a vessel, synthetic_clips.h)
 //
 // With BLEEDS_s the cut has been made without coagulation so long ago, and a tube whose handle the script closes has
 // aspirated for the last second.
@@ -8,12 +9,13 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "render_node/offscreen/png_writer.h"
 #include "render_node/scene_graph/display.h"
 #include "services/scene/builder/build.h"
 #include "services/scene/format/scene_file.h"
-#include "tests/integration/render/synthetic_scene.h"
+#include "tests/integration/render/synthetic_clips.h"
 
 int main(int argc, char** argv) {
   using namespace fulcrum;
@@ -39,12 +41,22 @@ int main(int argc, char** argv) {
         view.render.scope_target_W[k] = std::strtof(argv[7 + k], nullptr);
       }
     }
-    const render::SyntheticMoment moment = render::MakeSyntheticMoment(view, std::strtod(argv[2], nullptr));
+    render::ClippedMoment clipped;
+    if (std::string_view(argv[2]) == "clipped") {
+      view.tools[render::kApplier] = scene::DefaultTool(ToolKind::kClipApplier, Vec3f(0.045f, -0.075f, 0.085f));
+      clipped = render::MakeClippedMoment(view);
+      view.render.scope_target_W = clipped.between_W - Vec3f(0, 0, 0.003f);
+      view.render.fov_deg = argc == 5 ? std::strtof(argv[4], nullptr) : 15;
+    } else {
+      clipped.moment = render::MakeSyntheticMoment(view, std::strtod(argv[2], nullptr));
+    }
+    const render::SyntheticMoment& moment = clipped.moment;
     render::LaparoscopeView laparoscope(view);
     const auto display = render::MakeOffscreenDisplay(laparoscope, view.render);
     laparoscope.SetSmoothEdges(true);
     laparoscope.SetTissue(moment.tissue.xyz);
     laparoscope.SetTopology(moment.topology);
+    laparoscope.SetClips(clipped.clips);
     const double bleeds_s = argc >= 11 ? std::strtod(argv[10], nullptr) : 0;
     for (TemperaturePatch patch : moment.patches) {
       for (std::size_t k = 0; bleeds_s > 0 && k < patch.texels.size(); k += 4) {
