@@ -57,7 +57,8 @@ CocoFile::CocoFile(const std::filesystem::path& file) : file_(file), out_(file) 
   for (int k = 1; k < kTruthClasses; ++k) {
     const auto what = static_cast<TruthClass>(k);
     out_ << (k > 1 ? "," : "") << "\n  {\"id\": " << k << ", \"name\": \"" << NameOf(what)
-         << "\", \"supercategory\": \"" << (IsTool(what) ? "instrument" : "tissue") << "\"}";
+         << "\", \"supercategory\": \"" << (IsTool(what) || what == TruthClass::kClip ? "instrument" : "tissue")
+         << "\"}";
   }
   out_ << "],\n\"annotations\": [";
   if (!out_) throw InputError(file.string() + ": cannot be written");

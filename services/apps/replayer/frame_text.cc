@@ -65,8 +65,10 @@ std::string CalibrationText(const render::Pinhole& camera, double baseline_m, st
   for (int k = 0; k < kTruthClasses; ++k) {
     text += Format("%s\"%s\"", k > 0 ? ", " : "", NameOf(static_cast<TruthClass>(k)));
   }
-  text += Format("],\n  \"first_tool_instance\": %d,\n  \"first_organ_instance\": %d,\n  \"organs\": [",
-                 kFirstToolInstance, kFirstOrganInstance);
+  text += Format(
+      "],\n  \"first_tool_instance\": %d,\n  \"first_organ_instance\": %d,\n"
+      "  \"first_clip_instance\": %d,\n  \"organs\": [",
+      kFirstToolInstance, kFirstOrganInstance, kFirstClipInstance);
   const char* separator = "";
   for (const Solid& solid : solids) {
     if (solid.look == SolidLook::kBowel) continue;

@@ -77,10 +77,11 @@ struct Layout {
       const ToolKind kind = scene.tools[k].kind;
       if (!TouchesTissue(kind)) continue;
       tools.push_back(k);
-      const char* name = kind == ToolKind::kHook       ? "hook"
-                         : kind == ToolKind::kScissors ? "scissors"
-                         : kind == ToolKind::kSuction  ? "suction"
-                                                       : "grasper";
+      const char* name = kind == ToolKind::kHook          ? "hook"
+                         : kind == ToolKind::kScissors    ? "scissors"
+                         : kind == ToolKind::kSuction     ? "suction"
+                         : kind == ToolKind::kClipApplier ? "clip_applier"
+                                                          : "grasper";
       for (const char* value : {"x", "y", "z", "qx", "qy", "qz", "qw", "jaw", "force"}) {
         names.push_back(Format("%s%zu.%s", name, k, value));
         if (std::string_view(value) != "force") action_names.push_back(names.back());

@@ -42,10 +42,11 @@ std::uint16_t Rounded(double value, double most) {
 }
 
 TruthClass ClassOfTool(ToolKind kind) {
-  return kind == ToolKind::kHook       ? TruthClass::kHook
-         : kind == ToolKind::kScissors ? TruthClass::kScissors
-         : kind == ToolKind::kSuction  ? TruthClass::kSuction
-                                       : TruthClass::kGrasper;
+  return kind == ToolKind::kHook          ? TruthClass::kHook
+         : kind == ToolKind::kScissors    ? TruthClass::kScissors
+         : kind == ToolKind::kSuction     ? TruthClass::kSuction
+         : kind == ToolKind::kClipApplier ? TruthClass::kClipApplier
+                                          : TruthClass::kGrasper;
 }
 
 TruthClass ClassOfSurface(const DrawnSurface& surface, const std::array<ToolKind, kMaxTools>& kinds) {
@@ -53,6 +54,7 @@ TruthClass ClassOfSurface(const DrawnSurface& surface, const std::array<ToolKind
   if (surface.name == "rectum") return TruthClass::kRectum;
   if (surface.name == "organ") return TruthClass::kOrgan;
   if (surface.name == "fat") return TruthClass::kFat;
+  if (surface.name == "clip") return TruthClass::kClip;
   const bool of_sheet = surface.name == "membrane" || surface.name == "cut";
   return of_sheet ? TruthClass::kMembrane : TruthClass::kSurroundings;
 }
@@ -90,13 +92,15 @@ std::vector<Index> ChartsOf(const DrawnSurface& burn) {
 }  // namespace
 
 const char* NameOf(TruthClass what) {
-  constexpr std::array<const char*, kTruthClasses> kNames{"none",    "surroundings", "rectum",   "fat",   "membrane",
-                                                          "grasper", "hook",         "scissors", "organ", "suction"};
+  constexpr std::array<const char*, kTruthClasses> kNames{"none",     "surroundings", "rectum",       "fat",
+                                                          "membrane", "grasper",      "hook",         "scissors",
+                                                          "organ",    "suction",      "clip_applier", "clip"};
   return kNames[static_cast<std::size_t>(what)];
 }
 
 bool IsTool(TruthClass what) {
-  return (what >= TruthClass::kGrasper && what <= TruthClass::kScissors) || what == TruthClass::kSuction;
+  return (what >= TruthClass::kGrasper && what <= TruthClass::kScissors) || what == TruthClass::kSuction ||
+         what == TruthClass::kClipApplier;
 }
 
 Moment::Moment(render::LaparoscopeView* view, const render::Laparoscope& from, const SceneView& scene, int columns,
@@ -249,10 +253,13 @@ int Truth::InstanceOf(const Hit& hit) const {
   const DrawnSurface& surface = surfaces_[static_cast<std::size_t>(hit.surface)];
   if (surface.tool >= 0) return kFirstToolInstance + surface.tool;
   const TruthClass what = ClassOf(hit);
-  return what == TruthClass::kOrgan ? kFirstOrganInstance + surface.part : static_cast<int>(what);
+  return what == TruthClass::kOrgan  ? kFirstOrganInstance + surface.part
+         : what == TruthClass::kClip ? kFirstClipInstance + surface.part
+                                     : static_cast<int>(what);
 }
 
 TruthClass Truth::ClassOf(int instance) const {
+  if (instance >= kFirstClipInstance) return TruthClass::kClip;
   if (instance >= kFirstOrganInstance) return TruthClass::kOrgan;
   if (instance < kFirstToolInstance) return static_cast<TruthClass>(instance);
   return ClassOfTool(kinds_[static_cast<std::size_t>(instance - kFirstToolInstance)]);

@@ -26,15 +26,18 @@ enum class TruthClass : std::uint8_t {
   kGrasper,
   kHook,
   kScissors,
-  kOrgan,   ///< A solid that is no bowel.
-  kSuction  ///< A suction and irrigation tube.
+  kOrgan,    ///< A solid that is no bowel.
+  kSuction,  ///< A suction and irrigation tube.
+  kClipApplier,
+  kClip  ///< A clip on the tissue.
 };
-inline constexpr int kTruthClasses = 10;
+inline constexpr int kTruthClasses = 12;
 [[nodiscard]] const char* NameOf(TruthClass what);
 [[nodiscard]] bool IsTool(TruthClass what);
 
-/// Instances: a tissue's is its class, tool k's is kFirstToolInstance + k, the k-th organ's kFirstOrganInstance + k.
-inline constexpr int kFirstToolInstance = 16, kFirstOrganInstance = 32;
+/// Instances: a tissue's is its class, tool k's is kFirstToolInstance + k, the k-th organ's kFirstOrganInstance + k,
+/// the k-th clip's of ClipState kFirstClipInstance + k.
+inline constexpr int kFirstToolInstance = 16, kFirstOrganInstance = 32, kFirstClipInstance = 64;
 
 inline constexpr double kDepthUnit_m = 2e-5;        ///< Of a depth image; 0: nothing.
 inline constexpr double kFlowUnit_px = 1.0 / 64;    ///< Of a flow image, whose zero is 32768.
