@@ -48,10 +48,11 @@ TEST(ShippedScenes, AreListedWithNameAndDescription) {
     EXPECT_FALSE(scene.description.empty());
     names.insert(scene.name);
   }
-  EXPECT_EQ(names, (std::set<std::string>{
-                       "adhesions",   "assisted",     "built-in",   "camera",  "coagulate", "cut_line", "dissection",
-                       "gallbladder", "hold",         "keep_clear", "line",    "openhelp",  "pedal",    "pelvis",
-                       "regrasp",     "seal_and_cut", "small",      "strokes", "suction",   "traction", "two_hands"}));
+  EXPECT_EQ(names,
+            (std::set<std::string>{"adhesions", "assisted",   "built-in",    "camera",   "clips",        "coagulate",
+                                   "cut_line",  "dissection", "gallbladder", "hold",     "keep_clear",   "line",
+                                   "openhelp",  "pedal",      "pelvis",      "regrasp",  "seal_and_cut", "small",
+                                   "strokes",   "suction",    "traction",    "two_hands"}));
 }
 
 /// Each band is bound at both of its ends, over its whole width.
