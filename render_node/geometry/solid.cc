@@ -179,7 +179,7 @@ Solid ClipApplierShaft(const ToolShape& shape) {
   const std::array<Vec3f, 4> path{Vec3f(0, 0, hinge - 0.006f), Vec3f(0, 0, hinge - 0.0055f),
                                   Vec3f(0, 0, hinge - 0.001f), Vec3f(0, 0, hinge)};
   const std::array<float, 4> radii{r, 1.02f * r, 1.02f * r, 0.8f * r};
-  AppendTube(path, radii, 24, kSteel, &solid);
+  AppendTube(path, radii, 24, kTube, &solid);
   AppendStraightTube(hinge, hinge + 2e-5f, 0.7f * r, 0.7f * r, 24, kBore, &solid);
   return solid;
 }

@@ -7,8 +7,10 @@
 namespace fulcrum::render {
 namespace {
 
-// A vessel of the sheet's pattern runs along s here [m].
-const Vec2f kPlace(0.0401f, 0.0919f);
+// A vessel of the sheet's pattern runs along s here; the crest of the fold lies behind it, so that the scope sees the
+// vessel on the flank [m].
+const Vec2f kVessel(0.0401f, 0.0919f);
+const Vec2f kPlace = kVessel + Vec2f(0, 0.0028f);
 constexpr float kHalfDistance = 0.0035f;  // Of the clips [m].
 constexpr float kFold = 0.006f;           // Height of the fold [m].
 constexpr float kLength = 0.008f;         // Of a clip [m].
@@ -56,8 +58,8 @@ ClippedMoment MakeClippedMoment(const SceneView& scene) {
     Clip clip;
     clip.length_m = kLength;
     clip.tool = kApplier;
-    clip.anchors = {NodeAt(scene, at), NodeAt(scene, at + Vec2f(0, 0.004f)),
-                    NodeAt(scene, at + Vec2f(0.0015f, 0.002f))};
+    clip.anchors = {NodeAt(scene, at), NodeAt(scene, at - Vec2f(0, 0.0045f)),
+                    NodeAt(scene, at + Vec2f(0.0015f, -0.002f))};
     const Vec3f crest = place(clip.anchors[0]);
     const ClipPose pose{crest + Vec3f(0, 0, 0.0012f - 0.5f * kLength), Quatf(axes)};
     const auto& [a, b, c] = clip.anchors;
@@ -71,12 +73,12 @@ ClippedMoment MakeClippedMoment(const SceneView& scene) {
     turned.col(2) = shaft;
     turned.col(0) = (Vec3f::UnitY() - shaft.y() * shaft).normalized();
     turned.col(1) = turned.col(2).cross(turned.col(0));
-    tool.p_WT = crest - 0.005f * shaft;
+    tool.p_WT = crest - 0.008f * shaft;
     tool.q_WT = Quatf(turned);
     clipped.moment.handles.handles[kApplier].present = true;
     clipped.moment.handles.handles[kApplier].jaw_angle_rad = 0.5f;
   }
-  clipped.between = kPlace;
+  clipped.between = kVessel;
   clipped.between_W = place(NodeAt(scene, kPlace));
   return clipped;
 }
