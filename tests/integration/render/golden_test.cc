@@ -18,7 +18,7 @@
 #include "render_node/offscreen/png_writer.h"
 #include "render_node/scene_graph/display.h"
 #include "services/scene/builder/build.h"
-#include "tests/integration/render/synthetic_scene.h"
+#include "tests/integration/render/synthetic_clips.h"
 
 namespace fulcrum::render {
 namespace {
@@ -290,6 +290,18 @@ TEST_F(GoldenTest, Bleeding) {
                      view->UpdateEffects(12.0 + 0.1 * k);
                    }
                  }));
+}
+
+TEST_F(GoldenTest, Clipped) {
+  view_.tools[kApplier] = scene::DefaultTool(ToolKind::kClipApplier, Vec3f(0.045f, -0.075f, 0.085f));
+  const ClippedMoment clipped = MakeClippedMoment(view_);
+  ASSERT_EQ(clipped.clips.size(), 2u);
+  view_.render.scope_target_W = clipped.between_W - Vec3f(0, 0, 0.003f);
+  view_.render.fov_deg = 15;
+  const auto apply = [&](LaparoscopeView* view) { view->SetClips(clipped.clips); };
+  ExpectAsBefore("clipped", Draw(clipped.moment, apply));
+  const Difference difference = Compare(Draw(clipped.moment), Golden("clipped"));
+  EXPECT_GT(difference.worst_block, 3 * kWorstBlock) << "clips that are missing are seen";
 }
 
 TEST_F(GoldenTest, WarningShown) {
