@@ -37,7 +37,8 @@ class VesselSupply {
   /// A clip closes a part of a sheet: otherwise nothing is cut off.
   [[nodiscard]] bool has_clips() const { return !closed_.empty(); }
 
-  /// Whether a vessel at (s, t) [m] is cut off. Takes up to about a millisecond; without clips nothing.
+  /// Whether a vessel at (s, t) [m] is cut off. Visits the texels of vessels within kSupply_m at most; without clips
+  /// none.
   [[nodiscard]] bool CutOff(const Vec2f& material, const Atlas& atlas);
 
  private:
