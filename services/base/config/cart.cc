@@ -30,6 +30,8 @@ constexpr std::array kBauds = {9600, 19200, 38400, 57600, 115200, 230400, 460800
 constexpr std::size_t kMaxCalibrationPoints = 9;
 constexpr int kMaxUsbId = 0xffff;
 constexpr std::size_t kMaxWindowEnds = 32;
+/// Longest path [B], PATH_MAX of the system: LoadCart makes paths absolute, and its own copy must be readable.
+constexpr std::size_t kLongestPath = 4096;
 constexpr int kMaxButton = 8;  // Of a haptic device; a Touch has two.
 
 std::string ToolKey(std::size_t tool) { return std::string("tool") + std::to_string(tool); }
@@ -84,7 +86,7 @@ void ReadDevice(StrictMap map, DeviceConfig* device) {
   device->serial = map.TextOr("serial", device->serial, 63);
   device->force_scale = map.Number("force_scale", device->force_scale, Range::Between(0, 1));
   device->hand = map.Choice("hand", device->hand, kHandHolds);
-  device->motion = map.TextOr("motion", device->motion);
+  device->motion = map.TextOr("motion", device->motion, kLongestPath);
   StrictMap workspace = map.MapOrDefaults("workspace");
   WorkspaceConfig& w = device->workspace;
   const auto vector = [&workspace](const char* key, const Range& range, Vec3d* v) {
@@ -96,7 +98,10 @@ void ReadDevice(StrictMap map, DeviceConfig* device) {
 }
 
 void ReadTiming(StrictMap map, NodeId node, NodeTiming* timing) {
-  timing->rate_Hz = map.NumberSi("rate_Hz", timing->rate_Hz, Range::Between(1, 4000));
+  // A pedal counts as up after 0.1 s without a HandleState (kPedalTimeout_ns): one in each 40 ms leaves room for a
+  // loss.
+  const double slowest_Hz = node == NodeId::kHandleBridge ? 25 : 1;
+  timing->rate_Hz = map.NumberSi("rate_Hz", timing->rate_Hz, Range::Between(slowest_Hz, 4000));
   timing->fifo_priority = static_cast<int>(map.Integer("fifo_priority", timing->fifo_priority, 0, 99));
   timing->cpu = static_cast<int>(map.Integer("cpu", timing->cpu, -1, 1023));
   timing->spin_s = map.NumberSi("spin_us", timing->spin_s, Range::Between(0, 500));
@@ -110,7 +115,7 @@ CartConfig ReadCart(StrictYaml* file, CartConfig cart) {
   StrictMap root = file->root();
   cart.name = root.TextOr("name", cart.name, 31);
   cart.domain = static_cast<int>(root.Integer("domain", cart.domain, 1, 100));
-  cart.builds = root.TextOr("builds", cart.builds);
+  cart.builds = root.TextOr("builds", cart.builds, kLongestPath);
   StrictMap handles = root.MapOrDefaults("handles");
   for (std::size_t tool = 0; tool < cart.handles.size(); ++tool) {
     StrictMap map = handles.MapOrDefaults(ToolKey(tool));
@@ -146,7 +151,7 @@ CartConfig ReadCart(StrictYaml* file, CartConfig cart) {
     ReadTiming(nodes.MapOrDefaults(NodeName(id)), id, &cart.nodes[node]);
   }
   StrictMap security = root.MapOrDefaults("security");
-  cart.security.keys = security.TextOr("keys", cart.security.keys);
+  cart.security.keys = security.TextOr("keys", cart.security.keys, kLongestPath);
   cart.security.encrypt = security.Flag("encrypt", cart.security.encrypt);
   cart.security.group = security.TextOr("group", cart.security.group);
   StrictMap verdict = root.MapOrDefaults("verdict");

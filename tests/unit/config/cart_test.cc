@@ -80,6 +80,19 @@ TEST(Cart, MotionFileIsFoundFromTheCartsFolder) {
   EXPECT_EQ(cart.devices[1].motion, "/right.csv");
 }
 
+TEST(Cart, InADeepFolderItsEffectiveConfigurationLoadsToItself) {
+  const auto root = std::filesystem::temp_directory_path() / ("cart_test." + std::to_string(::getpid()));
+  std::filesystem::path folder = root;
+  for (const char c : {'a', 'b', 'c', 'd', 'e', 'f'}) folder /= std::string(60, c);
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "cart.yaml") << "security: {keys: keys}\nbuilds: builds\ndevices: {tool0: {motion: a.csv}}\n";
+  const CartConfig cart = LoadCart(folder / "cart.yaml");
+  std::filesystem::remove_all(root);
+  EXPECT_EQ(cart.security.keys, (folder / "keys").string());
+  const std::string yaml = CartToYaml(cart);
+  EXPECT_EQ(CartToYaml(LoadCartText(yaml, "again")), yaml);
+}
+
 TEST(Cart, EffectiveConfigurationLoadsToItself) {
   CartConfig cart = LoadCart(FULCRUM_SOURCE_DIR "/deploy/carts/lab.yaml");
   cart.handles[0].simulated.protocol = LineProtocol::kFramed;
@@ -160,6 +173,8 @@ const BadCart kBadCarts[] = {
     {"PedalWithPotentiometer", "pedal: {simulated: {broken_wire_s: [1, 2]}}", "unknown key"},
     {"RateZero", "nodes: {physics_node: {rate_Hz: 0}}",
      "nodes.physics_node.rate_Hz: '0' is out of range; valid: 1 to 4000 Hz"},
+    {"RateAtWhichAPedalGivesCurrentHalfOfTheTime", "nodes: {handle_bridge: {rate_Hz: 5}}",
+     "nodes.handle_bridge.rate_Hz: '5' is out of range; valid: 25 to 4000 Hz"},
     {"UnknownNode", "nodes: {physic_node: {rate_Hz: 100}}", "did you mean 'physics_node'?"},
     {"Priority", "nodes: {physics_node: {fifo_priority: 100}}", "an integer from 0 to 99"},
     {"Cpu", "nodes: {physics_node: {cpu: -2}}", "an integer from -1 to 1023"},
