@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <ostream>
 
 #include "services/records/log_tools/sequence_gaps.h"
@@ -18,7 +19,7 @@ ExitCode Verify(const std::filesystem::path& file, std::ostream* out) {
   Recording recording(file);
   std::map<std::string, Tally> tallies;
   SequenceGaps gaps;
-  std::uint64_t messages = 0, problems = 0;
+  std::uint64_t messages = 0, problems = 0, newest_ns = 0, late = 0;
   const auto problem = [&](const std::string& what) {
     *out << "! " << what << '\n';
     ++problems;
@@ -26,6 +27,8 @@ ExitCode Verify(const std::filesystem::path& file, std::ostream* out) {
   Entry entry;
   while (recording.Next(&entry)) {
     ++messages;
+    late += entry.message.log_time_ns < newest_ns ? 1 : 0;
+    newest_ns = std::max(newest_ns, entry.message.log_time_ns);
     Tally& tally = tallies[entry.source->name];
     tally.lost += gaps.Before(entry.message);
     bool passes = false;
@@ -43,6 +46,11 @@ ExitCode Verify(const std::filesystem::path& file, std::ostream* out) {
   if (recording.reader().closed() && indexed != messages) {
     problem("the indexes refer to " + std::to_string(indexed) + " messages, the chunks contain " +
             std::to_string(messages));
+  }
+  if (late > 0) {
+    problem(std::to_string(late) +
+            " messages were written so late that they are read after later ones: pictures and "
+            "maps of that time mix states");
   }
   for (const auto& known : tallies) {
     const std::string& topic = known.first;

@@ -84,7 +84,8 @@ void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>
     std::memcpy(at, sample.head.data(), sample.head.size());
     if (!sample.body.empty()) std::memcpy(at + sample.head.size(), sample.body.data(), sample.body.size());
     if (!is_whole()) return;  // Missed: the gap in the sequence is counted at the next sample.
-    if (filling_.used() == 0) filling_.begin_ns = written_ns;
+    if (filling_.used() == 0) filling_.Begin(written_ns);
+    filling_.CutIfDue(written_ns);
     (IsLarge(sample.topic) ? filling_.large : filling_.small).used += recording::kMessageHead + size;
   }
   writer->last_sequence = sample.sequence;
@@ -166,12 +167,25 @@ void Recorder::Exchange(std::int64_t now_ns, bool all, const std::string& end) {
     std::swap(filling_, writing_);
   }
   AddNewChannels();
-  Pack(&writing_.large, recording::ChunkPacker::kLargeChunkBytes);
-  Pack(&writing_.small, recording::ChunkPacker::kChunkBytes);
+  PackBatch(now_ns);
 }
 
-void Recorder::Pack(Batch::Part* part, std::size_t chunk_B) {
-  std::span<const std::uint8_t> records(part->bytes.get(), part->used);
+void Recorder::PackBatch(std::int64_t now_ns) {
+  // A short rest belongs to the piece before it, so that a batch of usual age is one piece.
+  std::vector<Batch::Cut>& cuts = writing_.cuts;
+  if (!cuts.empty() && now_ns - writing_.cut_ns < kLongestChunk_ns / 2) cuts.pop_back();
+  cuts.push_back({writing_.large.used, writing_.small.used});
+  Batch::Cut from;
+  for (const Batch::Cut& to : cuts) {
+    Pack({writing_.large.bytes.get() + from.large, to.large - from.large}, recording::ChunkPacker::kLargeChunkBytes);
+    Pack({writing_.small.bytes.get() + from.small, to.small - from.small}, recording::ChunkPacker::kChunkBytes);
+    from = to;
+  }
+  cuts.clear();
+  writing_.large.used = writing_.small.used = 0;
+}
+
+void Recorder::Pack(std::span<const std::uint8_t> records, std::size_t chunk_B) {
   while (!records.empty()) {
     // A remainder of up to twice the size of a chunk is one chunk, so that no small one is left.
     records =
@@ -179,7 +193,6 @@ void Recorder::Pack(Batch::Part* part, std::size_t chunk_B) {
     if (file_) Write();
     if (settings_.keep_s > 0) Keep();
   }
-  part->used = 0;
 }
 
 void Recorder::Write() {
@@ -196,9 +209,10 @@ void Recorder::Write() {
 void Recorder::Keep() {
   kept_B_ += packed_.bytes.size();
   kept_.push_back(packed_);
+  // Large and small topics have separate chunks, so the newest one may end before one that was kept earlier.
+  const auto keep_ns = static_cast<std::uint64_t>(1e9 * settings_.keep_s);
   const auto is_old = [&](const recording::PackedChunk& oldest) {
-    return kept_B_ > settings_.keep_B ||
-           1e-9 * static_cast<double>(packed_.last_ns - oldest.last_ns) > settings_.keep_s;
+    return kept_B_ > settings_.keep_B || oldest.last_ns + keep_ns < packed_.last_ns;
   };
   while (kept_.size() > 1 && is_old(kept_.front())) {
     kept_B_ -= kept_.front().bytes.size();

@@ -17,6 +17,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -99,9 +100,24 @@ class Recorder {
       std::unique_ptr<std::uint8_t[]> bytes;
       std::size_t used = 0;
     };
+    /// Lengths of both parts at a moment while they were filled.
+    struct Cut {
+      std::size_t large = 0, small = 0;
+    };
     Part large, small;
     std::int64_t begin_ns = 0;  ///< Arrival of its first sample.
+    /// A cut each kLongestChunk_ns of arrivals: what has waited longer, because the disk stood still, is packed in
+    /// pieces, large and small topics of one time side by side. Readers sort within a bounded time (TimeOrder).
+    std::vector<Cut> cuts;
+    std::int64_t cut_ns = 0;  ///< Arrival at the last cut, or begin_ns.
     [[nodiscard]] std::size_t used() const { return large.used + small.used; }
+    void Begin(std::int64_t now_ns) { begin_ns = cut_ns = now_ns; }
+    /// Call before a sample that arrived at `now_ns` is added.
+    void CutIfDue(std::int64_t now_ns) {
+      if (now_ns - cut_ns < kLongestChunk_ns) return;
+      cuts.push_back({large.used, small.used});
+      cut_ns = now_ns;
+    }
   };
   /// Place for a message record in the batch that is being filled; nullptr: its queue is full.
   [[nodiscard]] std::uint8_t* PlaceFor(TopicId topic, std::size_t record_B);
@@ -123,7 +139,9 @@ class Recorder {
   };
 
   void AddNewChannels();
-  void Pack(Batch::Part* part, std::size_t chunk_B);
+  /// Packs the batch that is being written and empties it.
+  void PackBatch(std::int64_t now_ns);
+  void Pack(std::span<const std::uint8_t> records, std::size_t chunk_B);
   /// Why the recording must end now; empty: it has room.
   [[nodiscard]] std::string ReasonToEnd(std::int64_t now_ns);
   /// Exchanges the batches if the filled one is large or old enough for a chunk, or if `all`, and writes the filled

@@ -200,6 +200,25 @@ TEST_F(LogTools, VerifyFindsGapsDamageAndWhatNoNodeWouldUse) {
   EXPECT_NE(out.str().find("not closed"), std::string::npos) << out.str();
 }
 
+TEST_F(LogTools, VerifyFindsWhatWasWrittenTooLateToBeReadInOrder) {
+  const fs::path file = folder_ / "late.mcap";
+  {
+    recording::McapWriter writer(file, "fulcrum", "fulcrum test");
+    const std::uint16_t schema = writer.AddSchema("fulcrum::idl::ToolState", "omgidl", bus::SchemaText("ToolState"));
+    std::vector<std::uint16_t> channels;
+    for (const char* node : {"one", "another"}) {
+      channels.push_back(writer.AddChannel(schema, "fulcrum/ToolState", "cdr", {{"node", node}}));
+    }
+    for (const std::uint16_t channel : channels) {
+      std::uint64_t time = kBegin_ns;
+      for (std::uint32_t i = 1; i <= 350; ++i) Write(&writer, channel, i, &time, bus::test::Sample<ToolState>(i));
+    }
+  }
+  std::ostringstream out;
+  EXPECT_EQ(Verify(file, &out), ExitCode::kFailure);
+  EXPECT_NE(out.str().find("messages were written so late"), std::string::npos) << out.str();
+}
+
 TEST_F(LogTools, ADamagedIndexIsFound) {
   const fs::path file = Make("a.mcap");
   const std::string bytes = Text(file);

@@ -11,12 +11,15 @@
 #include "services/records/recorder/priorities.h"
 #include "services/records/recorder/recorded_type.h"
 #include "services/records/recording/free_name.h"
+#include "services/records/recording/time_order.h"
 #include "services/transport/bus/convert/cdr.h"
 #include "services/transport/bus/topics.h"
 #include "tests/unit/recorder/recorder_fixture.h"
 
 namespace fulcrum::recorder {
 namespace {
+
+constexpr std::int64_t kStart = 1'000'000 * kMs;
 
 TEST(RecordedType, BlocksBeginBehindTheHeader) {
   TissueFrame frame;
@@ -208,6 +211,45 @@ TEST_F(RecorderTest, ADumpHoldsTheNewestPast) {
   EXPECT_GE(read.front().sequence, 72u);
   EXPECT_EQ(reader.metadata().at("dump").at("reason"), "a node died");
   EXPECT_FALSE(fs::exists(folder_ / "recording.mcap"));
+}
+
+TEST_F(RecorderTest, ADumpHoldsFramesThatAreNewerThanTheNewestSmallSample) {
+  RecorderSettings settings = Settings();
+  settings.file.clear();
+  settings.keep_s = 30;
+  Recorder recorder(settings);
+  std::uint64_t frames = 0, tools = 0;
+  for (std::int64_t ms = 0; ms < 1500; ++ms) {
+    if (ms % 10 == 0) Send(&recorder, TopicId::kTissueFrame, 2, ++frames, 3000, kStart + ms * kMs + 1000);
+    Send(&recorder, TopicId::kToolState, 1, ++tools, 168, kStart + ms * kMs - 3000);
+    if (ms % 50 == 0) recorder.Flush(kStart + ms * kMs);
+  }
+  recorder.Dump(folder_ / "dump.mcap", "", kStart + 1500 * kMs);
+  McapReader reader(folder_ / "dump.mcap");
+  EXPECT_EQ(ReadAll(&reader).size(), frames + tools);
+}
+
+TEST_F(RecorderTest, WhatWaitedForTheDiskIsReadInOrderOfTime) {
+  std::uint64_t frames = 0, tools = 0;
+  {
+    Recorder recorder(Settings());
+    for (std::int64_t ms = 0; ms < 5500; ++ms) {
+      const std::int64_t now = kStart + ms * kMs;
+      Send(&recorder, TopicId::kToolState, 1, ++tools, 168, now);
+      if (ms % 10 == 0) Send(&recorder, TopicId::kTissueFrame, 2, ++frames, 3000, now);
+      const bool disk_stands_still = ms > 1000 && ms < 4500;
+      if (ms % 50 == 0 && !disk_stands_still) recorder.Flush(now);
+    }
+    recorder.Close(kStart + 5500 * kMs);
+  }
+  recording::TimeOrder messages(folder_ / "recording.mcap");
+  std::uint64_t newest_ns = 0, count = 0;
+  for (McapMessage m; messages.Next(&m); ++count) {
+    EXPECT_GE(m.log_time_ns, newest_ns) << "message " << count;
+    newest_ns = m.log_time_ns;
+    if (HasFailure()) break;
+  }
+  EXPECT_EQ(count, frames + tools);
 }
 
 TEST_F(RecorderTest, WhatIsKeptForADumpIsBounded) {
