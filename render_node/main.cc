@@ -1,4 +1,5 @@
 // render_node: draws the picture of the laparoscope, into a window (--window) or off screen into PNG files.
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -27,6 +28,8 @@ ExitCode RunRender(app::NodeApp& app) {
   // Collected before the ports start the threads of the bus: those that draw, this one and the rasteriser's.
   const std::vector<int> drawing = render::ThreadsOfProcess();
   bus::Output<OperatorInput>* const operated = hands ? &app.MakeOutput<OperatorInput>() : nullptr;
+  // Not in Health: each source repeats its claim, so what a slow picture loses of a fast mouse is no loss.
+  const std::unique_ptr<bus::Input<OperatorInput>> operators = hands ? app.bus().MakeInput<OperatorInput>() : nullptr;
   const render::RenderPorts ports{app.MakeInput<TissueFrame>(),
                                   app.MakeInput<TopologyState>(),
                                   app.MakeInput<TemperaturePatch>(),
@@ -38,7 +41,8 @@ ExitCode RunRender(app::NodeApp& app) {
                                   app.MakeInput<ContactModel>(),
                                   app.MakeInput<ClipState>(),
                                   operated,
-                                  &app.MakeOutput<Picture>()};
+                                  &app.MakeOutput<Picture>(),
+                                  operators.get()};
   render::LowerPriority(drawing);
   render::RenderNode node(app.scene(), settings, ports, std::move(stage));
   runtime::Log(runtime::LogLevel::kInfo, node.display_description());

@@ -215,7 +215,7 @@ HandsState WindowInput::state() const {
 void WindowInput::Run(const std::stop_token& stop) {
   MouseHands hands(OperatorSource::kWindow);
   PadInputs pads(settings_);
-  std::int64_t sent_ns = 0;
+  std::int64_t sent_ns = 0, claim_ns = 0;
   bool take = false;
   while (!stop.stop_requested()) {
     connection_->Wait(pads.Wait_ms(hands.active(), kRepeat_ms), pads.descriptor());
@@ -231,9 +231,13 @@ void WindowInput::Run(const std::stop_token& stop) {
     const PadHands::Outcome pad = pads.Update(now_ns, &hands);
     pads.Rumble(force_N, now_ns);
     changed = changed || pad.changed;
-    if (pad.release && hands.active()) connection_->Release(&hands);
+    const bool taken_by_other = other_claim_ns_.load(std::memory_order_relaxed) > claim_ns;
+    if ((pad.release || taken_by_other) && hands.active()) connection_->Release(&hands);
     take = wants_take_.exchange(false, std::memory_order_relaxed) || pad.take || take;
-    if (take && !hands.active() && connection_->Take(&hands, now_ns)) changed = true;
+    if (take && !hands.active() && connection_->Take(&hands, now_ns)) {
+      claim_ns = now_ns;
+      changed = true;
+    }
     take = take && !hands.active();
     const bool due = hands.active() && now_ns - sent_ns >= kRepeat_ms * 1'000'000LL;
     if (changed || due || was_active != hands.active()) {

@@ -45,6 +45,9 @@ class WindowInput {
   void SetView(const HandsView& view);
   /// Takes the controls and the pointer, as Enter in the window does; for a click, which the window receives.
   void Take() { wants_take_.store(true, std::memory_order_relaxed); }
+  /// Another source may have claimed the controls at this time [ns]: if it was later than this window, the window
+  /// releases them.
+  void Yield(std::int64_t claim_ns) { other_claim_ns_.store(claim_ns, std::memory_order_relaxed); }
   [[nodiscard]] HandsState state() const;
 
  private:
@@ -55,7 +58,8 @@ class WindowInput {
   InputSettings settings_;
   std::unique_ptr<Connection> connection_;
   std::atomic<bool> wants_take_{false};
-  mutable std::mutex mutex_;  ///< Guards the members below.
+  std::atomic<std::int64_t> other_claim_ns_{0};  ///< Relaxed: a single number.
+  mutable std::mutex mutex_;                     ///< Guards the members below.
   HandsView view_;
   HandsState state_;
   std::jthread thread_;

@@ -354,9 +354,19 @@ PictureHeader RenderNode::HeaderNow() {
   return header;
 }
 
+void RenderNode::YieldHands() {
+  OperatorInput received;
+  std::int64_t newest_ns = 0;
+  while (ports_.operators != nullptr && ports_.operators->TakeNext(&received)) {
+    newest_ns = std::max(newest_ns, received.claim_ns);
+  }
+  if (newest_ns != 0) hands_->Yield(newest_ns);
+}
+
 void RenderNode::UpdateHands() {
   if (!hands_) return;
   if (display_.clicked()) hands_->Take();
+  YieldHands();
   hands_->SetView(ViewNow());
   const HandsState state = hands_->state();
   if (state != *hud_.hands) {

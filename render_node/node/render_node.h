@@ -41,6 +41,8 @@ struct RenderPorts {
   bus::Input<ClipState>& clips;
   bus::Output<OperatorInput>* operator_input;    ///< Null: the window operates nothing.
   bus::LoanOutput<Picture>* pictures = nullptr;  ///< Null: no live pictures.
+  /// What every source does, this one included. Null: no other source operates.
+  bus::Input<OperatorInput>* operators = nullptr;
 };
 
 struct RenderSettings {
@@ -129,6 +131,8 @@ class RenderNode {
   /// Follows the size of the window.
   void TakeSize();
   void UpdateHands();
+  /// The window gives up the controls when another source has claimed them.
+  void YieldHands();
   /// Where the pixels of the picture lie, and the tools.
   [[nodiscard]] HandsView ViewNow() const;
   [[nodiscard]] PictureHeader HeaderNow();

@@ -14,10 +14,16 @@ inline constexpr std::int64_t kOperatorSilence_ns = 250'000'000;
 class OperatorChoice {
  public:
   /// Takes a received sample. True if it is of the present operator: the source with the newest claim. A source that
-  /// releases the controls is followed by none until another claims them.
+  /// releases the controls is followed by none until one claims them later than that source had: a source whose claim
+  /// is older may still send what its operator wanted before.
   bool Add(const OperatorInput& input) {
-    const bool same_writer = input.source == newest_.source && input.stamp.epoch == newest_.stamp.epoch;
-    if (input.claim_ns == 0 ? !same_writer || newest_.claim_ns == 0 : input.claim_ns < newest_.claim_ns) return false;
+    if (input.claim_ns == 0) {
+      const bool same_writer = input.source == newest_.source && input.stamp.epoch == newest_.stamp.epoch;
+      if (!same_writer || newest_.claim_ns == 0) return false;
+      released_ns_ = newest_.claim_ns;
+    } else if (input.claim_ns < newest_.claim_ns || input.claim_ns <= released_ns_) {
+      return false;
+    }
     newest_ = input;
     return true;
   }
@@ -31,6 +37,7 @@ class OperatorChoice {
 
  private:
   OperatorInput newest_;
+  std::int64_t released_ns_ = 0;  ///< Claim that was released last; 0: none.
 };
 
 }  // namespace fulcrum

@@ -62,9 +62,10 @@ inline constexpr std::array kRoles{
     AccessRole{"thermal_node",
                kNodeWrites | SetOf(kTopologyState, kOpenCells, kTemperaturePatch, kThermalEvent, kTickManifest),
                kNodeReads | SetOf(kCauteryContact, kTearState, kHandleState, kGeneratorSetting)},
-    AccessRole{"render_node", kNodeWrites | SetOf(kOperatorInput, kPicture),
-               kNodeReads | SetOf(kTissueFrame, kTopologyState, kTemperaturePatch, kToolState, kHandleState,
-                                  kThermalEvent, kCauteryContact, kGeneratorSetting, kContactModel, kClipState)},
+    AccessRole{
+        "render_node", kNodeWrites | SetOf(kOperatorInput, kPicture),
+        kNodeReads | SetOf(kTissueFrame, kTopologyState, kTemperaturePatch, kToolState, kHandleState, kThermalEvent,
+                           kCauteryContact, kGeneratorSetting, kContactModel, kClipState, kOperatorInput)},
     AccessRole{"recorder", kNodeWrites, kAll},
     AccessRole{kReplayerIdentity, kAll, 0},
     AccessRole{kLinkIdentity, kAll, kAll},

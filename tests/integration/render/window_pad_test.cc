@@ -103,5 +103,18 @@ TEST_F(WindowPad, OperatesFromThePlugToThePlug) {
   EXPECT_TRUE(received_.Await([](const OperatorInput& input) { return input.claim_ns == 0; })) << "Back releases";
 }
 
+TEST_F(WindowPad, AnotherSourceThatClaimsLaterHasTheControls) {
+  const std::int64_t before_ns = runtime::MonotonicNs();
+  input_->Take();
+  ASSERT_TRUE(received_.Await([](const OperatorInput& input) { return input.claim_ns != 0; }));
+  input_->Yield(before_ns);
+  const std::int64_t now_ns = runtime::MonotonicNs();
+  ASSERT_TRUE(received_.Await([&](const OperatorInput& input) { return input.stamp.stamp_ns > now_ns; }));
+  EXPECT_TRUE(input_->state().active) << "that claim was earlier";
+  input_->Yield(runtime::MonotonicNs());
+  EXPECT_TRUE(received_.Await([](const OperatorInput& input) { return input.claim_ns == 0; }));
+  EXPECT_FALSE(received_.newest().tools[1].moves);
+}
+
 }  // namespace
 }  // namespace fulcrum::render

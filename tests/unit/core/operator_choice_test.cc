@@ -33,8 +33,18 @@ TEST(OperatorChoice, OnlyTheOperatorReleases) {
   EXPECT_NE(choice.At(11 * kMilli), nullptr);
   EXPECT_TRUE(choice.Add(Of(OperatorSource::kWindow, 5, 0, 12 * kMilli)));
   EXPECT_EQ(choice.At(12 * kMilli), nullptr);
-  EXPECT_TRUE(choice.Add(Of(OperatorSource::kProgram, 6, 5 * kMilli, 13 * kMilli)))
-      << "an older claim of another is valid";
+}
+
+TEST(OperatorChoice, AfterAReleaseAnOlderClaimDoesNotOperateAgain) {
+  OperatorChoice choice;
+  EXPECT_TRUE(choice.Add(Of(OperatorSource::kWindow, 5, 10 * kMilli, 10 * kMilli)));
+  EXPECT_TRUE(choice.Add(Of(OperatorSource::kBrowser, 6, 20 * kMilli, 20 * kMilli)));
+  EXPECT_TRUE(choice.Add(Of(OperatorSource::kBrowser, 6, 0, 30 * kMilli)));
+  EXPECT_FALSE(choice.Add(Of(OperatorSource::kWindow, 5, 10 * kMilli, 40 * kMilli)));
+  EXPECT_FALSE(choice.Add(Of(OperatorSource::kBrowser, 6, 20 * kMilli, 29 * kMilli))) << "sent before the release";
+  EXPECT_EQ(choice.At(40 * kMilli), nullptr);
+  EXPECT_TRUE(choice.Add(Of(OperatorSource::kWindow, 5, 50 * kMilli, 50 * kMilli))) << "it has claimed them anew";
+  EXPECT_NE(choice.At(50 * kMilli), nullptr);
 }
 
 TEST(OperatorChoice, ASilentOperatorIsAbsent) {
