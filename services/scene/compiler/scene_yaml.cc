@@ -1,7 +1,9 @@
 #include "services/scene/compiler/scene_yaml.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <cstdio>
 #include <fstream>
 #include <iterator>
 
@@ -26,6 +28,7 @@ struct Folders : std::vector<std::filesystem::path> {
 constexpr std::size_t kMaxKeys = 2000;
 constexpr std::size_t kMaxStructures = 64;
 constexpr std::size_t kMaxPathPoints = 64;
+constexpr double kLongestScript_s = 86400;
 
 const StrictMap::Choices<ToolKind> kToolKinds = {{"none", ToolKind::kNone},
                                                  {"grasper", ToolKind::kGrasper},
@@ -244,7 +247,14 @@ ScriptKeySettings ReadKey(StrictMap map, double duration_s, ToolKind kind, const
   constexpr double kShut_rad = 0.87;  // 50 degrees: of a tube's handle that is let go.
   ScriptKeySettings key;
   if (kind == ToolKind::kSuction) key.jaw_rad = kShut_rad;
-  key.time_s = map.NumberSi("time_s", Range::Between(0, duration_s));
+  // The range is that of any scene: `fulcrum scene schema` prints it.
+  key.time_s = map.NumberSi("time_s", Range::Between(0, kLongestScript_s));
+  if (key.time_s > duration_s) {
+    std::array<char, 128> reason{};
+    std::snprintf(reason.data(), reason.size(), "%g s is after the end of the script; valid: 0 to %g s (duration_s)",
+                  key.time_s, duration_s);
+    map.Fail("time_s", reason.data());
+  }
   if (map.Has("world_mm")) {
     key.world_m = map.Vector3Si("world_mm", Range::Between(-1000, 1000));
   } else {
@@ -273,7 +283,8 @@ void ReadScript(StrictMap map, SceneSettings* scene) {
   std::vector<std::string> sheets;
   if (scene->has_organ) sheets.emplace_back("membrane");
   for (const SheetSettings& sheet : scene->sheets) sheets.push_back(sheet.name);
-  scene->script_duration_s = map.NumberSi("duration_s", scene->script_duration_s, Range::Between(0.1, 86400));
+  scene->script_duration_s =
+      map.NumberSi("duration_s", scene->script_duration_s, Range::Between(0.1, kLongestScript_s));
   if (const std::string hand = map.TextOr("hand", ""); !hand.empty()) {
     scene->hand = HandNamed(hand);
     if (!scene->hand) map.Fail("hand", "'" + hand + "' is not one of " + std::string(kHandNames));

@@ -55,6 +55,15 @@ TEST(ShippedScenes, AreListedWithNameAndDescription) {
                                    "strokes",   "suction",    "traction",    "two_hands"}));
 }
 
+TEST(ShippedScenes, HaveOneRuleForTimesOfAScriptHoweverLongItIs) {
+  for (const char* name : {"built-in", "pelvis"}) {
+    for (const config::KeyRule& rule : SceneRules(kScenes / (std::string(name) + ".yaml"))) {
+      if (!rule.path.ends_with("[].time_s")) continue;
+      EXPECT_EQ(rule.valid, "0 to 86400 s") << name << " " << rule.path;
+    }
+  }
+}
+
 /// Each band is bound at both of its ends, over its whole width.
 TEST(ShippedScenes, AdhesionsJoinTwoLoops) {
   const SceneData data = CompileScene(kScenes / "adhesions.yaml", {}, {}).data;
