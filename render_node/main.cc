@@ -8,6 +8,7 @@
 #include "render_node/offscreen/graphics_report.h"
 #include "services/base/runtime/realtime.h"
 #include "services/nodes/app/node_app.h"
+#include "services/nodes/app/node_confinement.h"
 #include "services/nodes/app/spare.h"
 
 namespace {
@@ -64,7 +65,10 @@ ExitCode RunRender(app::NodeApp& app) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (render::AsksForGraphics(argc, argv)) return static_cast<int>(render::PrintGraphics());
+  if (render::AsksForGraphics(argc, argv)) {
+    app::ConfineGraphics();
+    return static_cast<int>(render::PrintGraphics());
+  }
   constexpr const char* kPurpose = "Draws what the laparoscope sees; --graphics alone prints what draws off screen.";
   return app::NodeMain(argc, argv, NodeId::kRender, kPurpose, RunRender);
 }

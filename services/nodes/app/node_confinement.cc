@@ -35,6 +35,11 @@ std::vector<fs::path> ShaderCaches() {
   return caches;
 }
 
+void AddGraphics(runtime::WritablePlaces* places) {
+  for (const fs::path& cache : ShaderCaches()) places->folders.push_back(cache);
+  for (const fs::path& device : GraphicsDevices("/dev")) places->devices.push_back(device);
+}
+
 bool HasForeignDriver(NodeId node, const config::CartConfig& cart) {
   return node == NodeId::kHaptics && std::any_of(cart.devices.begin(), cart.devices.end(), [](const auto& device) {
            return device.kind == config::DeviceKind::kTouch;
@@ -42,6 +47,16 @@ bool HasForeignDriver(NodeId node, const config::CartConfig& cart) {
 }
 
 }  // namespace
+
+std::vector<fs::path> GraphicsDevices(const fs::path& devices) {
+  std::vector<fs::path> found;
+  std::error_code ignored;
+  for (const fs::directory_entry& entry : fs::directory_iterator(devices, ignored)) {
+    const std::string name = entry.path().filename();
+    if (name == "dri" || name == "dxg" || name.starts_with("nvidia")) found.push_back(entry.path());
+  }
+  return found;
+}
 
 std::optional<runtime::WritablePlaces> WritablePlacesOf(NodeId node, const NodeOptions& options,
                                                         const config::CartConfig& cart) {
@@ -61,11 +76,7 @@ std::optional<runtime::WritablePlaces> WritablePlacesOf(NodeId node, const NodeO
     }
     case NodeId::kRender: {  // Pictures.
       places.folders.push_back(options.session / "frames");
-      for (const fs::path& cache : ShaderCaches()) places.folders.push_back(cache);
-      for (const char* gpu :
-           {"/dev/dri", "/dev/nvidiactl", "/dev/nvidia-modeset", "/dev/nvidia-uvm", "/dev/nvidia0", "/dev/nvidia1"}) {
-        places.devices.emplace_back(gpu);
-      }
+      AddGraphics(&places);
       places.devices.emplace_back("/dev/input");  // Rumble; a gamepad that is plugged in is a new file.
       break;
     }
@@ -77,6 +88,14 @@ std::optional<runtime::WritablePlaces> WritablePlacesOf(NodeId node, const NodeO
       break;
   }
   return places;
+}
+
+void ConfineGraphics() {
+  runtime::WritablePlaces places{{}, {"/dev/null"}};
+  AddGraphics(&places);
+  // What the kernel does not offer is told by `fulcrum doctor --security`.
+  (void)runtime::LimitWriting(places);
+  (void)runtime::LimitSystemCalls();
 }
 
 void ConfineNode(NodeId node, const NodeOptions& options, const config::CartConfig& cart) {

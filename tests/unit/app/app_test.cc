@@ -1,10 +1,15 @@
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
 #include <limits>
+#include <set>
+#include <string>
 
 #include "services/base/core/error.h"
 #include "services/nodes/app/health_report.h"
 #include "services/nodes/app/node_app.h"
+#include "services/nodes/app/node_confinement.h"
 
 namespace fulcrum::app {
 namespace {
@@ -62,6 +67,19 @@ TEST(NodeOptionsTest, RefusesWhatCannotWork) {
 TEST(NodeOptionsTest, HelpAndVersionNeedNothingElse) {
   EXPECT_NE(Parse({"--help"}).answer.find("--session"), std::string::npos);
   EXPECT_EQ(Parse({"--version"}).answer.find("physics_node "), 0u);
+}
+
+TEST(NodeConfinementTest, DrawsWithAGpuOfAnyNumber) {
+  namespace fs = std::filesystem;
+  const fs::path dev = fs::path(testing::TempDir()) / "app_test_dev";
+  fs::create_directories(dev / "nvidia-caps");
+  fs::create_directories(dev / "dri");
+  for (const char* file : {"nvidia3", "nvidia12", "nvidiactl", "dxg", "null", "mem"}) std::ofstream(dev / file) << "";
+  std::set<std::string> names;
+  for (const fs::path& device : GraphicsDevices(dev)) names.insert(device.filename());
+  fs::remove_all(dev);
+  EXPECT_EQ(names, (std::set<std::string>{"dri", "dxg", "nvidia-caps", "nvidia12", "nvidia3", "nvidiactl"}));
+  EXPECT_TRUE(GraphicsDevices(dev / "nothing").empty());
 }
 
 TEST(RateMeterTest, ShowsTheLastSecondOnly) {
