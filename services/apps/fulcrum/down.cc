@@ -16,12 +16,13 @@ ExitCode Down(const Words& words) {
   }
   const int domain = DomainOf(arguments);
   const ExitCode answer = Ask(domain, "down", "");
-  // Waits until the session has ended, so that the next one can start at once.
-  constexpr auto kPatience = std::chrono::seconds(30);
+  // Waits until the session has ended, so that the next one can start at once. A recorder with a slow disk may take
+  // half a minute (services/nodes/app/longest_end.h).
+  constexpr auto kPatience = std::chrono::seconds(60);
   const auto begin = std::chrono::steady_clock::now();
   while (DomainGuard::IsHeld(domain)) {
     if (std::chrono::steady_clock::now() - begin > kPatience) {
-      throw std::runtime_error("the session has not ended within 30 s; see fulcrum status");
+      throw std::runtime_error("the session has not ended within 60 s; see fulcrum status");
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }

@@ -24,6 +24,7 @@
 #include "services/base/runtime/service_notify.h"
 #include "services/nodes/app/cart_security.h"
 #include "services/nodes/app/health_report.h"
+#include "services/nodes/app/longest_end.h"
 #include "services/nodes/app/node_confinement.h"
 #include "services/nodes/app/recorder_wait.h"
 #include "services/transport/bus/dds/shared_memory.h"
@@ -45,8 +46,6 @@ constexpr auto kServePeriod = std::chrono::milliseconds(100);
 /// dt, when the ToolState of that time has arrived; thermal begins when the contact of that physics step has arrived.
 constexpr double kPhysicsPhase = 0.12, kThermalPhase = 0.65;
 constexpr auto kHealthPeriod = std::chrono::milliseconds(100);
-// A node that has not ended after this time hangs; killing it is safe for its checkpoint.
-constexpr unsigned kLongestEndS = 3;
 
 /// Status text in `systemctl status`.
 std::string StatusLine(const Health& health) {
@@ -228,7 +227,7 @@ struct NodeApp::Impl {
 
   void EndThreads(runtime::CyclicThread* steps, std::jthread* health) {
     // SIGALRM's default action ends the process.
-    ::alarm(kLongestEndS);
+    ::alarm(static_cast<unsigned>(LongestEnd_s(node)));
     state = HealthState::kStopping;
     steps->Stop();
     health->request_stop();

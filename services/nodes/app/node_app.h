@@ -114,7 +114,7 @@ class NodeApp {
                const HealthFill& fill_health);
 
   /// Publishes Health at once instead of after its period, because an event has occurred for which other processes
-  /// wait. Any thread except a real-time one.
+  /// wait. Any thread but that of the servo: it takes a lock and wakes the thread of Health.
   void PublishHealthNow();
 
   /// Ends Run() with this code, for example kDeviceLost; `reason` is logged. Any thread except a real-time one.

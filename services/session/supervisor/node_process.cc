@@ -12,12 +12,13 @@
 #include "services/base/core/exit_code.h"
 #include "services/base/core/tick.h"
 #include "services/base/runtime/cyclic_thread.h"
+#include "services/nodes/app/longest_end.h"
 
 namespace fulcrum::supervisor {
 namespace {
 
-constexpr std::int64_t kPatienceWithRestart = 3 * kSecond_ns;
-constexpr std::int64_t kLongestEnd = 4 * kSecond_ns;
+// From the time at which a node that hangs ends itself to its SIGKILL at the end of a session.
+constexpr std::int64_t kBeyondLongestEnd = kSecond_ns;
 // From the start of a node to the start of its spare: the spare must not compete with the node's own start.
 constexpr std::int64_t kBeforeSpare = kSecond_ns;
 // From a start for which the system had no descriptor, process or memory to the next try.
@@ -47,7 +48,8 @@ void NodeProcess::Start(std::int64_t now_ns) {
 }
 
 void NodeProcess::WatchPulse(std::int64_t now_ns) {
-  if (complaint_ == nullptr) {
+  // A node that ends has its own time for it, and sends no Health at last.
+  if (complaint_ == nullptr && kill_ns_ == 0) {
     complaint_ = pulse_.Complaint(command_.has_spare, now_ns);
     if (complaint_ != nullptr) process_.Signal(SIGKILL);
   }
@@ -138,7 +140,7 @@ void NodeProcess::ResetTimeouts(std::int64_t now_ns) { pulse_.ResetTimeouts(now_
 void NodeProcess::AskRestart(std::int64_t now_ns) {
   spare_.reset();  // The program may have been rebuilt since the spare was started.
   process_.Signal(SIGTERM);
-  kill_ns_ = now_ns + kPatienceWithRestart;
+  kill_ns_ = now_ns + app::LongestEnd_s(id()) * kSecond_ns;
 }
 
 void NodeProcess::Swap(NodeCommand command, std::int64_t now_ns) {
@@ -166,15 +168,14 @@ void EndAll(const std::vector<SupervisedNode*>& nodes, const std::function<void(
   for (SupervisedNode* node : nodes) node->Stop();
   const std::int64_t begin = runtime::MonotonicNs();
   const auto is_gone = [](SupervisedNode* node) { return node->HasEnded(); };
-  bool gave_up = false;
+  std::vector<SupervisedNode*> awaited = nodes;
   while (!std::all_of(nodes.begin(), nodes.end(), is_gone)) {
     const std::int64_t now = runtime::MonotonicNs();
-    if (now - begin > kLongestEnd && !gave_up) {
-      gave_up = true;
-      for (SupervisedNode* node : nodes) {
-        if (!node->HasEnded()) given_up(*node, node->StopWaiting());
-      }
-    }
+    std::erase_if(awaited, [&](SupervisedNode* node) {
+      if (now - begin <= app::LongestEnd_s(node->id()) * kSecond_ns + kBeyondLongestEnd) return false;
+      if (!node->HasEnded()) given_up(*node, node->StopWaiting());
+      return true;
+    });
     turn(now);
     std::this_thread::sleep_for(kPollPeriod);
   }

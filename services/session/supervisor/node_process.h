@@ -60,8 +60,9 @@ class NodeProcess final : public SupervisedNode {
   bool failed_ = false;
 };
 
-/// Ends all nodes: calls Stop on each, and StopWaiting on those that still run 4 s later. `given_up` is called with
-/// such a node and what was done to it; `turn` is called repeatedly while the nodes end.
+/// Ends all nodes: calls Stop on each, and StopWaiting on those that still run a second after their LongestEnd_s
+/// (services/nodes/app/longest_end.h). `given_up` is called with such a node and what was done to it; `turn` is called
+/// repeatedly while the nodes end.
 void EndAll(const std::vector<SupervisedNode*>& nodes, const std::function<void(std::int64_t now_ns)>& turn,
             const std::function<void(const SupervisedNode& node, const char* done)>& given_up);
 

@@ -19,6 +19,8 @@ constexpr std::int64_t kLongestStill_ns = 5 * kSecond_ns;
 constexpr std::int64_t kLongestStillWithSpare_ns = 5 * kSecond_ns / 4;
 // ... and of a node with a low rate, whose ticks are seldom.
 constexpr std::int64_t kLongestStill_periods = 3;
+// A step of the recorder lasts as long as the disk stands still, or writes a dump; what it receives meanwhile waits.
+constexpr std::int64_t kLongestStepOnDisk_ns = 30 * kSecond_ns;
 
 }  // namespace
 
@@ -34,6 +36,7 @@ void NodePulse::Add(const Health& health, std::int64_t now_ns) {
   steps_ = steps;
   ticks_ = health.ticks;
   has_reported_ = true;
+  waits_for_disk_ = health.node == NodeId::kRecorder;
   period_ns_ = health.rate_asked_Hz > 0 ? std::llround(1e9 / static_cast<double>(health.rate_asked_Hz)) : 0;
 }
 
@@ -50,7 +53,8 @@ const char* NodePulse::Complaint(bool has_spare, std::int64_t now_ns) const {
   const std::int64_t longest =
       std::max(replaceable ? kLongestStillWithSpare_ns : kLongestStill_ns, kLongestStill_periods * period_ns_);
   if (now_ns - std::max(health_ns_, timeouts_reset_ns_) > longest) return kSilent;
-  if (steps_ && now_ns - std::max(progress_ns_, timeouts_reset_ns_) > longest)
+  const std::int64_t longest_step = waits_for_disk_ ? kLongestStepOnDisk_ns : longest;
+  if (steps_ && now_ns - std::max(progress_ns_, timeouts_reset_ns_) > longest_step)
     return "was stuck in a step for too long and was killed";
   return nullptr;
 }

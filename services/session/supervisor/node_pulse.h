@@ -30,6 +30,7 @@ class NodePulse {
   std::uint64_t ticks_ = 0;
   bool has_reported_ = false;
   bool steps_ = false;
+  bool waits_for_disk_ = false;  ///< In its steps.
 };
 
 }  // namespace fulcrum::supervisor

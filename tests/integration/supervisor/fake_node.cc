@@ -1,7 +1,8 @@
 // A node that computes nothing: the supervisor's tests start it under the names of the real ones. Its behaviour is set
 // by a file <session>/../<node name>.do: "crash" (abort at once), "exit N", "hang" (in the step), "hang once" (in the
 // step after 1 s of the session, but not after a restart), "mismatch", "flicker" (degraded every other 0.1 s of the
-// session), "step MS" (duration of each step), "metric NAME VALUE" and "lost N" (samples) in Health.
+// session), "step MS" (duration of each step), "end MS" (from its last step to its end, as of a recorder
+// with a slow disk), "metric NAME VALUE" and "lost N" (samples) in Health.
 #include <unistd.h>
 
 #include <chrono>
@@ -81,7 +82,8 @@ int main(int argc, char** argv) {
     // The one folder that both a node for pictures and one for checkpoints may write to: nodes are confined.
     const std::filesystem::path hung =
         app.options().session / "frames" / (std::string(fulcrum::NodeName(node)) + ".hung");
-    return app.Run(
+    const std::chrono::duration<double, std::milli> end(verb == "end" ? number : 0);
+    const ExitCode code = app.Run(
         {.name = "fake", .period_ns = 10'000'000},
         [&](const fulcrum::Tick& tick) {
           if (order == "hang") Hang();
@@ -108,5 +110,8 @@ int main(int argc, char** argv) {
             health->last_error = "a plug is loose";
           }
         });
+    std::this_thread::sleep_for(end);
+    if (verb == "end") fulcrum::runtime::Log(fulcrum::runtime::LogLevel::kInfo, "has ended by itself");
+    return code;
   });
 }

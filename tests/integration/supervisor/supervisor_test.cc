@@ -242,6 +242,16 @@ TEST_F(SupervisorTest, NodeThatHangsInItsStepStillEndsWithTheSession) {
   EXPECT_EQ(SharedMemory(), std::vector<std::string>{});
 }
 
+TEST_F(SupervisorTest, ARecorderMayTakeLongerToEndThanOtherNodes) {
+  fs::copy_file(folder_ / "bin" / NodeName(NodeId::kPhysics), folder_ / "bin" / "recorder");
+  Order(NodeId::kRecorder, "end 6000");
+  Order(NodeId::kPhysics, "end 6000");
+  runtime::ChildProcess up = Up({"--seconds", "1", "--record"});
+  Wait(&up);
+  EXPECT_EQ(Count(NodeLog(NodeId::kRecorder), "has ended by itself"), 1u) << Log();
+  EXPECT_EQ(Count(NodeLog(NodeId::kPhysics), "has ended by itself"), 0u) << Log();
+}
+
 TEST_F(SupervisorTest, ChildrenDieWithAKilledSupervisorAndNothingIsLeft) {
   runtime::ChildProcess up = Up();
   ASSERT_TRUE(WaitUntil([&] { return AllJoined(); })) << Log();

@@ -320,8 +320,10 @@ TEST(DemandsTest, OnlyWhatTheNodesCanDoIsAskedFor) {
 class PulseTest : public ::testing::Test {
  protected:
   PulseTest() { pulse_.Start(kSecond_ns); }
-  void Say(double time_s, std::uint64_t ticks, HealthState state = HealthState::kRunning, float rate_Hz = 15) {
+  void Say(double time_s, std::uint64_t ticks, HealthState state = HealthState::kRunning, float rate_Hz = 15,
+           NodeId node = NodeId::kRender) {
     Health health;
+    health.node = node;
     health.state = state;
     health.ticks = ticks;
     health.rate_asked_Hz = rate_Hz;
@@ -351,6 +353,15 @@ TEST_F(PulseTest, HealthThatGoesOnWithoutTicksIsStuck) {
   EXPECT_EQ(At(11.3, true), "was stuck in a step for too long and was killed");
   Say(11.4, 6);
   EXPECT_EQ(At(11.4, true), "");
+}
+
+TEST_F(PulseTest, ARecorderMayWaitForItsDisk) {
+  Say(10, 5, HealthState::kRunning, 20, NodeId::kRecorder);
+  Say(39, 5, HealthState::kRunning, 20, NodeId::kRecorder);
+  EXPECT_EQ(At(39, false), "");
+  Say(41, 5, HealthState::kRunning, 20, NodeId::kRecorder);
+  EXPECT_EQ(At(41, false), "was stuck in a step for too long and was killed");
+  EXPECT_EQ(At(47, false), "sent no Health for too long and was killed");
 }
 
 TEST_F(PulseTest, TheFirstStepIsPartOfTheStart) {
