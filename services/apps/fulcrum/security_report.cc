@@ -58,10 +58,16 @@ Line KeysOfCart(const fs::path& file) {
     const fs::path keys = cart.security.keys;
     if (keys.empty()) return {Mark::kOff, what, file.string() + " names none", none};
     std::string problems;
-    std::size_t usable = 0;
+    std::size_t usable = 0, revoked = 0;
     for (const keys::IdentityState& state : keys::InspectKeyFolder(keys, std::time(nullptr))) {
-      if (state.present && state.problem.empty()) ++usable;
-      if (state.present && !state.problem.empty()) problems += (problems.empty() ? "" : "; ") + state.problem;
+      if (!state.present) continue;
+      if (state.guest && state.revoked) {  // As it was ordered; `fulcrum keys check` does not complain either.
+        ++revoked;
+      } else if (state.problem.empty()) {
+        ++usable;
+      } else {
+        problems += (problems.empty() ? "" : "; ") + state.problem;
+      }
     }
     struct stat status {};
     const unsigned mode = ::stat(keys.c_str(), &status) == 0 ? status.st_mode & 0777u : 0;
@@ -70,7 +76,9 @@ Line KeysOfCart(const fs::path& file) {
       return {Mark::kLook, what, keys.string() + ": " + problems,
               "participants with these keys cannot join, or other users can read them: fulcrum keys check"};
     }
-    return {Mark::kOn, what, keys.string() + ": " + std::to_string(usable) + " identities, mode " + Octal(mode),
+    const std::string guests = revoked > 0 ? ", " + std::to_string(revoked) + " revoked" : "";
+    return {Mark::kOn, what,
+            keys.string() + ": " + std::to_string(usable) + " identities" + guests + ", mode " + Octal(mode),
             std::string("a participant without a certificate of this authority gets no topic") +
                 (cart.security.encrypt ? "; datagrams are encrypted" : "")};
   } catch (const InputError& error) {

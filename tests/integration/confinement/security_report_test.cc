@@ -68,6 +68,11 @@ TEST_F(SecurityReport, KeysThatOthersCanReadAndLeftMemoryNeedALook) {
   ASSERT_EQ(Program("fulcrum", {"keys", "init", keys}).End(0), 0);
   std::ofstream(cart) << "security: {keys: " << keys.string() << "}\n";
   EXPECT_TRUE(Of("keys of the cart", Report({"--cart", cart})).starts_with("✓"));
+  ASSERT_EQ(Program("fulcrum", {"keys", "issue", "probe", "--read", "Health", "--keys", keys}).End(0), 0);
+  ASSERT_EQ(Program("fulcrum", {"keys", "revoke", "probe", "--keys", keys}).End(0), 0);
+  const std::string revoked = Of("keys of the cart", Report({"--cart", cart}));
+  EXPECT_TRUE(revoked.starts_with("✓")) << revoked;
+  EXPECT_NE(revoked.find("1 revoked"), std::string::npos) << revoked;
   fs::permissions(keys, fs::perms::all);
   const std::string open = Of("keys of the cart", Report({"--cart", cart}));
   EXPECT_TRUE(open.starts_with("!")) << open;
