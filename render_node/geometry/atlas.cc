@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "render_node/geometry/membrane_mesh.h"
 #include "render_node/geometry/texel.h"
@@ -66,7 +67,6 @@ Atlas::Atlas(const SceneView& scene) : texel_m_(scene.membrane.texel_m) {
   blocks_x_ = (width_ + kBlock - 1) / kBlock;
   covered_.assign(static_cast<std::size_t>(blocks_x_) * ((height_ + kBlock - 1) / kBlock), 0);
   touched_ = cut_ = marked_ = covered_;
-  painted_.assign(scene.membrane.triangle_count(), 0);
   const auto body = static_cast<std::uint8_t>(std::lround((scene.thermal.body_temperature_C - 20.0f) * 2));
   texels_.resize(4u * static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
   if (body > kWarm) std::ranges::fill(marked_, std::uint8_t{1});
@@ -256,23 +256,15 @@ bool Atlas::Covered(int x, int y) const { return covered_[TexelIndex(x / kBlock,
 AtlasRect Atlas::PaintCuts(const SceneView& scene, const TopologyState& topology) {
   const std::uint32_t cols = scene.membrane.cols;
   AtlasRect changed;
-  std::size_t index = 0;
+  if (std::exchange(painted_, true)) return changed;
   for (std::uint32_t row = 0; row + 1 < scene.membrane.rows; ++row) {
     for (std::uint32_t col = 0; col + 1 < cols; ++col) {
-      for (int half = 0; half < 2; ++half, ++index) {
+      for (int half = 0; half < 2; ++half) {
         const MembraneTriangle t = MembraneTriangleAt(cols, row, col, half);
-        std::uint8_t dead = 0;
-        for (int k = 0; k < 3; ++k) {
-          dead = static_cast<std::uint8_t>(dead | (TestBit(topology.dead_edges, t.edges[k]) ? 1u << k : 0u));
-        }
-        if (dead == painted_[index]) {
-          continue;
-        }
-        painted_[index] = dead;
         std::array<Vec2f, 3> middles;
         int count = 0;
         for (int k = 0; k < 3; ++k) {
-          if ((dead >> k) & 1) {
+          if (TestBit(topology.dead_edges, t.edges[k])) {
             middles[count++] =
                 0.5f * (scene.membrane_material[t.nodes[k]] + scene.membrane_material[t.nodes[(k + 1) % 3]]);
           }

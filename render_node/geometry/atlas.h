@@ -31,9 +31,10 @@ class Atlas {
   /// another surface, has the wrong size or lies outside.
   AtlasRect Apply(const TemperaturePatch& patch);
 
-  /// Draws slits from the topology where no patch has arrived yet, as after a restart of the renderer. Each cut
-  /// triangle gets a capsule between the middles of its dead edges, with a browned rim. Triangles that are already
-  /// painted are skipped. Returns the changed rectangle.
+  /// Draws slits from the first topology that is given where no patch has arrived yet, as after a restart of the
+  /// renderer. Each cut triangle gets a capsule between the middles of its dead edges, with a browned rim. Later
+  /// topologies paint nothing: the patches of what they have cut arrive as well, and would not correct a rim that
+  /// reaches into a place without heat. Returns the changed rectangle.
   AtlasRect PaintCuts(const SceneView& scene, const TopologyState& topology);
 
   /// Sets the liquid in a cell of the film: blood and clot together, clot, water (geometry/sheet_fluid.h). It is
@@ -125,7 +126,7 @@ class Atlas {
   std::vector<std::uint8_t> marked_;   // Per block: not Untouched().
   std::uint64_t touches_ = 0, marks_ = 0;
   std::uint64_t removals_ = 0, patches_ = 0;
-  std::vector<std::uint8_t> painted_;  // Per membrane triangle: bits of the dead edges that are already drawn.
+  bool painted_ = false;  // By PaintCuts().
 };
 
 }  // namespace fulcrum::render

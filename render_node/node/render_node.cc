@@ -197,8 +197,10 @@ void RenderNode::PassOver() {
 }
 
 void RenderNode::TakeThermal() {
+  // The first one also if nothing is cut: all that is cut later is then known to come with patches.
+  const bool first = topology_.stamp.sequence == 0;
   const std::uint64_t known = topology_.revision;
-  if (ports_.topology.TakeLatest(&topology_) && topology_.revision != known) {
+  if (ports_.topology.TakeLatest(&topology_) && (first || topology_.revision != known)) {
     if (topology_.scene_hash != scene_.hash || !view_.SetTopology(topology_)) {
       Report("TopologyState of another scene dropped");
     } else {

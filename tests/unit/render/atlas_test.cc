@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <vector>
 
 #include "services/scene/builder/build.h"
 #include "tests/support/whole_topology.h"
@@ -179,6 +180,45 @@ TEST_F(AtlasTest, WhatAPatchSaidIsNotPaintedOver) {
   (void)atlas_.Apply(PatchAt(x > 128 ? x - 128 : 0, y > 128 ? y - 128 : 0, 200));
   (void)atlas_.PaintCuts(view_, topology_);
   EXPECT_EQ(Texel(slit_, 3), 200);
+}
+
+/// A sheet of 40 x 40 mm with nodes each millimetre: two places of an atlas with texels of 0.1 mm side by side.
+TEST(AtlasOfTwoPlaces, AColdTearBesideABorderLeavesTheOtherPlaceIntact) {
+  constexpr Index kNodes = 41;
+  constexpr float kCell_m = 0.001f, kAlong_m = 0.0155f;
+  std::vector<Vec2f> material;
+  for (Index k = 0; k < kNodes * kNodes; ++k) {
+    material.emplace_back(kCell_m * static_cast<float>(k % kNodes), kCell_m * static_cast<float>(k / kNodes));
+  }
+  SceneView scene;
+  scene.membrane.rows = scene.membrane.cols = kNodes;
+  scene.membrane.texel_m = 1e-4f;
+  scene.membrane_material = material;
+  scene.thermal.body_temperature_C = 37;
+  TopologyState topology = WholeTopology(scene);
+  Atlas atlas(scene);
+  (void)atlas.PaintCuts(scene, topology);
+  // All edges from column 25 to 26, at 25.5 mm: the border is at 25.6 mm.
+  for (Index row = 10; row < 20; ++row) {
+    for (const Index direction : {0u, 2u}) SetBit(topology.dead_edges, 3 * (row * kNodes + 25) + direction);
+  }
+  EXPECT_TRUE(atlas.PaintCuts(scene, topology).empty());
+  // Thermal removes the cells at the tear, which are in one place, and sends that place alone.
+  TemperaturePatch patch = PatchAt(0, 0, 0);
+  for (int k = 0; k < kPatchTexels * kPatchTexels; ++k) {
+    const bool removed = k % kPatchTexels == kPatchTexels - 1 && k / kPatchTexels > 100 && k / kPatchTexels < 200;
+    patch.texels[4 * static_cast<std::size_t>(k)] = 34;
+    patch.texels[4 * static_cast<std::size_t>(k) + 3] = removed ? 0 : 255;
+  }
+  ASSERT_FALSE(atlas.Apply(patch).empty());
+  EXPECT_TRUE(atlas.Removed({0.02555f, kAlong_m}));
+  EXPECT_FALSE(atlas.Removed({0.02575f, kAlong_m}));
+  for (const float across_m : {0.0245f, 0.0257f, 0.0259f, 0.0263f}) {
+    const auto texel = atlas.At({across_m, kAlong_m}).value();
+    EXPECT_EQ(int{texel[1]}, 0) << across_m;
+    EXPECT_EQ(int{texel[2]}, 0) << across_m;
+    EXPECT_EQ(int{texel[3]}, 255) << across_m;
+  }
 }
 
 }  // namespace
