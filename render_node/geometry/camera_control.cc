@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "render_node/geometry/laparoscope.h"
+
 namespace fulcrum::render {
 namespace {
 
@@ -13,7 +15,17 @@ constexpr float kRoll_deg = 5;
 constexpr float kNearest_m = 0.02f, kFarthest_m = 0.3f;
 constexpr float kSteepest = 0.97f;  // Limit of the cosine to the vertical, where the horizon is undefined.
 
+Vec3f ForwardOf(const RenderParams& camera) { return (camera.scope_target_W - camera.scope_tip_W).normalized(); }
+
 }  // namespace
+
+float CarriedRoll_deg(const RenderParams& before, const RenderParams& moved, const Quatf& turn) {
+  const Vec3f forward = ForwardOf(moved), up = LevelUp(forward);
+  if (up == LevelUp(ForwardOf(before)) && up == Vec3f::UnitZ()) return before.roll_deg;
+  const Eigen::Matrix4f view = MakeLaparoscope(before).view;
+  const Vec3f right = turn * Vec3f(view.block<1, 3>(0, 0).transpose());
+  return RollOf({right, right.cross(forward), forward}, up) * 180 / std::numbers::pi_v<float>;
+}
 
 void CameraControl::Press(CameraKey key) {
   if (held_) return;
@@ -22,7 +34,9 @@ void CameraControl::Press(CameraKey key) {
   const auto turn = [&](float angle, const Vec3f& axis) {
     const Vec3f turned = Eigen::AngleAxisf(angle, axis) * out;
     if (std::abs(turned.normalized().z()) < kSteepest) {
+      const RenderParams before = now_;
       now_.scope_tip_W = now_.scope_target_W + turned;
+      now_.roll_deg = CarriedRoll_deg(before, now_, Quatf(Eigen::AngleAxisf(angle, axis)));
     }
   };
   const auto move = [&](float factor) {

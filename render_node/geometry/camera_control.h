@@ -8,6 +8,11 @@
 
 namespace fulcrum::render {
 
+/// Roll [degrees] of `moved`, which looks from where `before` looked with its line of sight turned by `turn`, so that
+/// the picture has turned with it. It is the roll of `before` unless "up" of a level picture is another one for the new
+/// line of sight (LevelUp): that changes by up to 90 degrees where the line of sight becomes steep.
+[[nodiscard]] float CarriedRoll_deg(const RenderParams& before, const RenderParams& moved, const Quatf& turn);
+
 enum class CameraKey { kLeft, kRight, kUp, kDown, kNearer, kFarther, kRollLeft, kRollRight, kReset };
 
 class CameraControl {

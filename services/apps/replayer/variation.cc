@@ -5,6 +5,7 @@
 #include <numbers>
 #include <random>
 
+#include "render_node/geometry/camera_control.h"
 #include "services/apps/replayer/report_format.h"
 
 namespace fulcrum::replay {
@@ -50,11 +51,18 @@ Variation VariationOf(const SceneView& scene, std::uint32_t seed, std::uint32_t 
   const Vec3f back = camera.scope_tip_W - camera.scope_target_W;
   const float sideways = draw.Around(kTurn_rad), upward = draw.Around(kTurn_rad);
   const Vec3f across = back.cross(Vec3f::UnitZ());
+  Quatf turn = Quatf::Identity();
   Vec3f turned = back;
-  if (across.norm() > 1e-6f) turned = Eigen::AngleAxisf(upward, across.normalized()) * turned;
-  turned = Eigen::AngleAxisf(sideways, Vec3f::UnitZ()) * turned;
+  if (across.norm() > 1e-6f) {
+    const Eigen::AngleAxisf up(upward, across.normalized());
+    turn = up;
+    turned = up * turned;
+  }
+  const Eigen::AngleAxisf side(sideways, Vec3f::UnitZ());
+  turn = side * turn;
+  turned = side * turned;
   moved.scope_tip_W = moved.scope_target_W + (1 + draw.Around(kDistance)) * turned;
-  moved.roll_deg += draw.Around(kRoll_deg);
+  moved.roll_deg = render::CarriedRoll_deg(camera, moved, turn) + draw.Around(kRoll_deg);
   return variation;
 }
 

@@ -116,6 +116,26 @@ TEST(CameraControlTest, TurnsAboutTheTargetAndComesBack) {
   EXPECT_EQ(camera.params().scope_target_W, scene.scope_target_W);
 }
 
+TEST(CameraControlTest, NoKeyTurnsThePictureByMuchMoreThanTheScope) {
+  // From the patient's side, 59 degrees down: "up" of a level picture becomes cranial on the way up.
+  RenderParams scene;
+  scene.scope_tip_W = Vec3f(0.06f, 0, 0.1f);
+  scene.scope_target_W = Vec3f::Zero();
+  CameraControl camera(scene);
+  const auto view = [&] { return Mat3f(MakeLaparoscope(camera.params()).view.topLeftCorner<3, 3>()); };
+  const Mat3f first = view();
+  for (const auto& [key, times] : {std::pair{CameraKey::kUp, 5}, {CameraKey::kLeft, 20}, {CameraKey::kDown, 5}}) {
+    for (int k = 0; k < times; ++k) {
+      const Mat3f before = view();
+      camera.Press(key);
+      const Eigen::AngleAxisf turn(Mat3f(view() * before.transpose()));
+      EXPECT_NEAR(turn.angle(), RadiansOf(3), 1e-3f) << k;
+    }
+  }
+  for (int k = 0; k < 20; ++k) camera.Press(CameraKey::kRight);
+  EXPECT_LT((view() - first).norm(), 1e-3f) << "back where it was, and level";
+}
+
 TEST(LaparoscopeTest, LightIsOneAtTheTargetAndLeavesBetweenSightAndShaft) {
   RenderParams params;
   params.scope_tip_W = Vec3f(0, 0, 0.1f);
