@@ -1,3 +1,4 @@
+#include <optional>
 #include <ostream>
 #include <tuple>
 
@@ -70,20 +71,33 @@ Digest MakeDigest(const std::filesystem::path& file, const Filter& filter, const
   Digest digest;
   ForEachMessage(file, filter, [&](const Stream& stream, const Entry& entry) {
     Hash64 hash;
-    (void)WithDecoded(*entry.source->topic, entry.message.data,
-                      [&](const auto& message) { AddTo(&hash, message, without); });
+    const bool decoded = WithDecoded(*entry.source->topic, entry.message.data,
+                                     [&](const auto& message) { AddTo(&hash, message, without); });
+    if (!decoded) hash.Add(std::as_bytes(entry.message.data));
     digest[stream].try_emplace(entry.message.sequence, hash.value());
   });
   return digest;
 }
 
+/// None: it cannot be decoded.
 template <class T>
-T Fetch(const std::filesystem::path& file, const Filter& filter, const Stream& wanted, std::uint32_t sequence) {
-  T found;
+std::optional<T> Fetch(const std::filesystem::path& file, const Filter& filter, const Stream& wanted,
+                       std::uint32_t sequence) {
+  T message;
+  bool decoded = false;
   ForEachMessage(file, filter, [&](const Stream& stream, const Entry& entry) {
-    if (stream == wanted && entry.message.sequence == sequence) (void)bus::DecodeCdr(entry.message.data, &found);
+    if (stream == wanted && entry.message.sequence == sequence) decoded = bus::DecodeCdr(entry.message.data, &message);
   });
-  return found;
+  return decoded ? std::optional(std::move(message)) : std::nullopt;
+}
+
+/// "" unless there are such messages.
+std::string UndecodedText(const char* which, bool undecoded, const std::filesystem::path& file) {
+  if (!undecoded) return {};
+  recording::McapReader reader(file, recording::McapReader::Depth::kChunkHeads);
+  for (recording::McapMessage none{}; reader.Next(&none);) {
+  }
+  return std::string(", in the ") + which + " it cannot be decoded (" + SchemasText(reader) + ")";
 }
 
 struct Count {
@@ -130,8 +144,14 @@ ExitCode Diff(const std::filesystem::path& first, const std::filesystem::path& s
     for (const bus::TopicRole& role : bus::kTopicRoles) {
       if (bus::TopicLabel(role.id) != stream.topic) continue;
       bus::WithMessageOf(role.id, [&]<class T>(std::type_identity<T>) {
-        const auto difference = FirstDifference(Fetch<T>(first, only, stream, *count.first_different),
-                                                Fetch<T>(second, only, stream, *count.first_different), without);
+        const std::optional<T> one = Fetch<T>(first, only, stream, *count.first_different);
+        const std::optional<T> two = Fetch<T>(second, only, stream, *count.first_different);
+        if (!one || !two) {
+          *out << "  first at sequence " << *count.first_different << UndecodedText("first", !one, first)
+               << UndecodedText("second", !two, second) << '\n';
+          return;
+        }
+        const auto difference = FirstDifference(*one, *two, without);
         if (!difference) return;
         *out << "  first at sequence " << *count.first_different << ": " << difference->field << " = "
              << difference->first << " | " << difference->second << '\n';

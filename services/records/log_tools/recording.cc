@@ -3,8 +3,27 @@
 #include <algorithm>
 
 #include "services/base/core/error.h"
+#include "services/transport/bus/hex.h"
+#include "services/transport/bus/schema.h"
 
 namespace fulcrum::log_tools {
+namespace {
+
+std::string SchemaOf(const recording::McapReader& reader) {
+  const auto versions = reader.metadata().find("versions");
+  if (versions == reader.metadata().end()) return {};
+  const auto hash = versions->second.find("schema_hash");
+  return hash == versions->second.end() ? std::string() : hash->second;
+}
+
+}  // namespace
+
+std::string SchemasText(const recording::McapReader& reader) {
+  const std::string file = SchemaOf(reader);
+  return "schema " + (file.empty() ? "unknown" : file) + " of the file, " + bus::Hex(bus::SchemaHash()) + " here";
+}
+
+bool HasThisSchema(const recording::McapReader& reader) { return SchemaOf(reader) == bus::Hex(bus::SchemaHash()); }
 
 Recording::Recording(const std::filesystem::path& file, Filter filter) : messages_(file), filter_(std::move(filter)) {}
 

@@ -55,6 +55,12 @@ class Recording {
   std::optional<std::uint64_t> first_ns_;
 };
 
+/// The schema with which a recording was written, as far as it has been read, and that of this build, for people: where
+/// they differ, messages may not be decoded.
+[[nodiscard]] std::string SchemasText(const recording::McapReader& reader);
+/// Whether the recording says that it was written with the schema of this build.
+[[nodiscard]] bool HasThisSchema(const recording::McapReader& reader);
+
 /// Decodes a message of a known topic and calls `use(message)`. Returns false, without calling `use`, if it cannot be
 /// decoded.
 template <class Use>

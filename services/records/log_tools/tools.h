@@ -23,15 +23,17 @@ void PrintList(const std::filesystem::path& folder, std::ostream* out);
 void PrintMessages(const std::filesystem::path& file, const Filter& filter, std::size_t longest, std::ostream* out);
 
 /// Writes one table per topic, `folder`/TOPIC.csv. Returns the files. Throws InputError rather than replace one,
-/// and when one cannot be written whole.
+/// and when one cannot be written whole. Where messages cannot be decoded, writes the tables of the others and then
+/// throws MismatchError for a recording of another schema, InputError for one that is damaged.
 std::vector<std::filesystem::path> ExportTables(const std::filesystem::path& file, const Filter& filter,
                                                 const std::filesystem::path& folder);
 
 /// Reads the whole file and checks its consistency. kFailure if a fault is found.
 ExitCode Verify(const std::filesystem::path& file, std::ostream* out);
 
-/// Prints the first difference of each topic and node. Messages are paired by their writer's sequence. @param without a
-/// field that is skipped, for example "stamp". kFailure if there is a difference.
+/// Prints the first difference of each topic and node. Messages are paired by their writer's sequence; those that
+/// cannot be decoded are compared by their bytes. @param without a field that is skipped, for example "stamp". kFailure
+/// if there is a difference.
 ExitCode Diff(const std::filesystem::path& first, const std::filesystem::path& second, const Filter& filter,
               const std::string& without, std::ostream* out);
 

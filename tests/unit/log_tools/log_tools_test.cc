@@ -15,6 +15,7 @@
 #include "services/records/recorder/recorder.h"
 #include "services/records/recording/mcap_index.h"
 #include "services/records/recording/mcap_writer.h"
+#include "services/transport/bus/hex.h"
 #include "services/transport/bus/schema.h"
 #include "tests/unit/bus/same.h"
 #include "tests/unit/bus/samples.h"
@@ -255,6 +256,45 @@ TEST_F(LogTools, DiffNamesTheFirstFieldThatDiffers) {
   EXPECT_NE(out.str().find(" | 0.5"), std::string::npos) << out.str();
   out.str("");
   EXPECT_EQ(Diff(a, other, {{"Health"}}, "", &out), ExitCode::kDone) << "only the requested topics are compared";
+}
+
+/// Three ToolStates of another layout: all bytes behind the head have this value.
+fs::path MakeUndecodable(const fs::path& file, std::uint8_t value, const std::string& schema_hash) {
+  recording::McapWriter writer(file, "fulcrum", "fulcrum 0.0.9");
+  writer.AddMetadata("versions", {{"schema_hash", schema_hash}});
+  const std::uint16_t channel = writer.AddChannel(0, bus::RoleOf<ToolState>().name, "cdr", {{"node", "haptics_node"}});
+  for (std::uint32_t i = 1; i <= 3; ++i) {
+    std::vector<std::uint8_t> bytes(24, value);
+    bytes[0] = bytes[2] = bytes[3] = 0;
+    bytes[1] = 1;
+    writer.Write(channel, i, kBegin_ns + i * kStep_ns, kBegin_ns + i * kStep_ns, std::as_bytes(std::span(bytes)));
+  }
+  return file;
+}
+
+TEST_F(LogTools, DiffComparesTheBytesOfMessagesThatCannotBeDecoded) {
+  const fs::path a = MakeUndecodable(folder_ / "a.mcap", 7, "old"), b = MakeUndecodable(folder_ / "b.mcap", 8, "old"),
+                 same = MakeUndecodable(folder_ / "c.mcap", 7, "old");
+  std::ostringstream out;
+  EXPECT_EQ(Diff(a, b, {}, "", &out), ExitCode::kFailure);
+  EXPECT_NE(out.str().find("3 in both, 3 different"), std::string::npos) << out.str();
+  EXPECT_NE(out.str().find("first at sequence 1, in the first it cannot be decoded (schema old of the file, "),
+            std::string::npos)
+      << out.str();
+  EXPECT_EQ(Diff(a, same, {}, "", &out), ExitCode::kDone);
+}
+
+TEST_F(LogTools, ExportRefusesMessagesThatCannotBeDecoded) {
+  std::string said;
+  try {
+    (void)ExportTables(MakeUndecodable(folder_ / "a.mcap", 7, "old"), {}, folder_ / "tables");
+  } catch (const MismatchError& error) {
+    said = error.what();
+  }
+  EXPECT_NE(said.find("3 messages of ToolState; schema old of the file, "), std::string::npos) << said;
+  EXPECT_FALSE(fs::exists(folder_ / "tables" / "ToolState.csv")) << "no empty table";
+  const fs::path damaged = MakeUndecodable(folder_ / "b.mcap", 7, bus::Hex(bus::SchemaHash()));
+  EXPECT_THROW((void)ExportTables(damaged, {}, folder_ / "tables"), InputError);
 }
 
 TEST_F(LogTools, AMessageThatWasReceivedLateIsNotPassedOver) {
