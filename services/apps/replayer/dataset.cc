@@ -1,7 +1,6 @@
 #include "services/apps/replayer/dataset.h"
 
 #include <algorithm>
-#include <cmath>
 #include <fstream>
 #include <future>
 #include <memory>
@@ -47,13 +46,14 @@ class DatasetMaker {
   DatasetMaker(const DatasetSettings& settings, const SceneView& scene, const render::Look& look)
       : settings_(settings), scene_(scene), projector_(settings.recording, scene, look), writer_(kWriters) {
     projector_.replay().node().view().SetDetail(kTruthDetail);
-    end_s_ = settings.until_s >= 0 ? std::min(settings.until_s, projector_.end_s()) : projector_.end_s();
-    count_ = static_cast<std::uint64_t>(std::floor(end_s_ / settings.every_s + 1e-6)) + 1;
+    const PictureNumbers numbers(settings.recording, projector_.span(), settings.until_s, settings.every_s);
+    first_ = numbers.first;
+    count_ = numbers.count;
   }
 
   DatasetResult Make(const std::function<void(double)>& progress) {
     for (std::uint64_t i = 0; i < count_; ++i) {
-      const double time_s = static_cast<double>(i) * settings_.every_s;
+      const double time_s = static_cast<double>(first_ + i) * settings_.every_s;
       projector_.GoTo(time_s);
       // The first frames show the first tissue if it came later.
       if (i == 0) Begin();
@@ -132,7 +132,7 @@ class DatasetMaker {
   std::optional<CocoFile> coco_;
   std::ofstream frames_;
   DatasetSheet sheet_;
-  double end_s_ = 0;
+  std::uint64_t first_ = 0;  // Steps from session time 0 to the first frame.
   std::uint64_t count_ = 0;
   std::unique_ptr<const Truth> before_;
   ChannelWriter writer_;

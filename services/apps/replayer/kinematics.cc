@@ -7,9 +7,7 @@
 namespace fulcrum::replay {
 namespace {
 
-/// Longest time between two samples between which a value is taken to be linear [ns]: five periods of physics. Nodes
-/// publish less often while nothing moves, and not at all while they are restarted.
-constexpr std::int64_t kLongest_ns = 50'000'000;
+constexpr auto kLongest_ns = static_cast<std::int64_t>(1e9 * Kinematics::kLongest_s);
 
 template <class Sample>
 bool IsNew(const std::vector<Sample>& samples, const Stamp& stamp) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -28,9 +29,14 @@ class Kinematics {
   void Add(const ContactModel& contacts);
 
   [[nodiscard]] bool empty() const { return tools_.empty(); }
+  /// Number of ToolStates.
+  [[nodiscard]] std::size_t poses() const { return tools_.size(); }
+  /// Longest time between two samples between which a value is taken to be linear [s]: five periods of physics. Nodes
+  /// publish less often while nothing moves, and not at all while they are restarted.
+  static constexpr double kLongest_s = 0.05;
   /// At this stamp [ns of CLOCK_MONOTONIC]: poses, jaws and forces linearly between the samples before and after (turns
-  /// along the shorter arc) if they are at most 50 ms apart, otherwise as in the one before; pedals as last sampled;
-  /// before the first sample, that one.
+  /// along the shorter arc) if they are at most kLongest_s apart, otherwise as in the one before; pedals as last
+  /// sampled; before the first sample, that one.
   [[nodiscard]] KinematicState At(std::int64_t stamp_ns) const;
 
  private:

@@ -144,30 +144,31 @@ std::string JsonList(const std::vector<std::string>& texts) {
   return "[" + list + "]";
 }
 
-/// Of a recording, which ends at `end_s`, the session time of the last row [s].
-double LastRow(double end_s, double until_s) { return until_s >= 0 ? std::min(until_s, end_s) : end_s; }
+constexpr double kPeriod_s = 1.0 / kVideoRate_Hz;
+
+double TimeOf(std::uint64_t frame) { return static_cast<double>(frame) / kVideoRate_Hz; }
 
 /// Finds before the first picture what would end the work in hours. The samples are read again for the episode: those
 /// of all recordings may not fit into memory.
 void Check(const fs::path& recording, const SceneView& scene, double until_s) {
   const std::string leave_out = "; or leave out " + recording.string();
   try {
-    const double last_s = LastRow(ReadKinematics(recording, scene).end_s, until_s);
-    if (last_s > kLongestEpisode_s) {
+    const PictureNumbers rows(recording, ReadSpan(recording, scene), until_s, kPeriod_s);
+    const double length_s = TimeOf(rows.count - 1);
+    if (length_s > kLongestEpisode_s) {
       throw InputError(
           recording.string() +
           Format(": an episode of %.1f s; valid: 0 to %.0f s, because the time of a row is a 32-bit number. "
                  "Give --until %.0f",
-                 last_s, kLongestEpisode_s, kLongestEpisode_s));
+                 length_s, kLongestEpisode_s, std::floor(TimeOf(rows.first) + kLongestEpisode_s)));
     }
+    (void)ReadKinematics(recording, scene, TimeOf(rows.first + rows.count - 1));
   } catch (const InputError& error) {
     throw InputError(error.what() + leave_out);
   } catch (const MismatchError& error) {
     throw MismatchError(error.what() + leave_out);
   }
 }
-
-double TimeOf(std::uint64_t frame) { return static_cast<double>(frame) / kVideoRate_Hz; }
 
 /// Of the two quaternions of an orientation those near the ones before.
 void KeepSigns(const KinematicState& before, KinematicState* state) {
@@ -187,19 +188,19 @@ Episode DrawEpisode(const fs::path& recording, const SceneView& scene, double un
                     const std::function<void(double)>& progress) {
   SceneView drawn = scene;
   drawn.stereo = {};  // One picture, whatever display the session had.
-  const Kinematics kinematics = ReadKinematics(recording, drawn).kinematics;
   Projector projector(recording, drawn);
-  const double end_s = LastRow(projector.end_s(), until_s);
-  const auto count = static_cast<std::uint64_t>(std::floor(end_s * kVideoRate_Hz + 1e-6)) + 1;
+  const PictureNumbers rows(recording, projector.span(), until_s, kPeriod_s);
+  const Kinematics kinematics = ReadKinematics(recording, drawn, TimeOf(rows.first + rows.count - 1));
   render::Bitmap picture;
-  projector.GoTo(0);
+  projector.GoTo(TimeOf(rows.first));
   if (!projector.Draw(&picture)) throw std::runtime_error(recording.string() + ": has no tissue to show");
   Episode episode;
   VideoFile video(file, picture.width, picture.height, kVideoRate_Hz, kPicturesInGroup);
-  for (std::uint64_t i = 0; i < count; ++i) {
-    projector.GoTo(TimeOf(i));
+  for (std::uint64_t i = 0; i < rows.count; ++i) {
+    const double time_s = TimeOf(rows.first + i);
+    projector.GoTo(time_s);
     RenderReplay& replay = projector.replay();
-    KinematicState state = kinematics.At(replay.session_start_ns() + std::llround(1e9 * TimeOf(i)));
+    KinematicState state = kinematics.At(replay.session_start_ns() + std::llround(1e9 * time_s));
     if (i > 0) KeepSigns(episode.states.back(), &state);
     ShowInstruments(state, drawn, &replay.node());
     replay.node().DrawFrom(replay.node().camera(), &picture);
@@ -208,9 +209,9 @@ Episode DrawEpisode(const fs::path& recording, const SceneView& scene, double un
       for (std::size_t k = 0; k < 3; ++k) episode.colours.Add(k, picture.rgb[p + k] / 255.0);
     }
     episode.states.push_back(state);
-    if (progress) progress(TimeOf(i));
+    if (progress) progress(time_s);
   }
-  video.Finish(std::string(drawn.name), {}, TimeOf(count));
+  video.Finish(std::string(drawn.name), {}, TimeOf(rows.count));
   return episode;
 }
 

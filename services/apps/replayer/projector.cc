@@ -1,33 +1,19 @@
 #include "services/apps/replayer/projector.h"
 
 #include <algorithm>
-#include <cstdint>
-#include <string>
-
-#include "services/apps/replayer/session_facts.h"
-#include "services/base/core/error.h"
 
 namespace fulcrum::replay {
 namespace {
 
 /// Longest time between two steps of the renderer: its effects follow the instruments, and its inputs keep few samples.
 constexpr double kStep_s = 1.0 / 30;
-constexpr double kLongest_s = 7 * 24 * 3600.0;  // As of fulcrum up.
-
-double EndOf(const std::filesystem::path& recording, std::int64_t start_ns) {
-  return 1e-9 * static_cast<double>(ClockOf(recording).last_ns - start_ns);
-}
 
 }  // namespace
 
 Projector::Projector(const std::filesystem::path& recording, const SceneView& scene, const render::Look& look)
     : recording_(recording), scene_(scene), look_(look) {
   Begin();
-  if (Read()) end_s_ = std::max(0.0, EndOf(recording_, replay_->session_start_ns()));
-  if (end_s_ > kLongest_s) {
-    throw InputError(recording.string() + ": ends at session time " + std::to_string(end_s_) +
-                     " s; has another program removed its metadata \"clock\"?");
-  }
+  if (Read()) span_ = SpanOf(recording_, ClockOf(recording_), replay_->session_start_ns());
 }
 
 void Projector::Begin() {
@@ -47,7 +33,7 @@ bool Projector::Read() {
 }
 
 void Projector::GoTo(double time_s) {
-  time_s = std::clamp(time_s, 0.0, end_s_);
+  time_s = std::clamp(time_s, 0.0, end_s());
   if (time_s < at_s_) Begin();
   double due_s = at_s_ + kStep_s;
   while (read_s_ < time_s && Read()) {

@@ -8,6 +8,7 @@
 #include "render_node/geometry/look.h"
 #include "render_node/offscreen/framebuffer.h"
 #include "services/apps/replayer/render_replay.h"
+#include "services/apps/replayer/session_facts.h"
 #include "services/base/core/scene_view.h"
 
 namespace fulcrum::replay {
@@ -18,8 +19,10 @@ class Projector {
   /// std::runtime_error when OpenGL is missing.
   Projector(const std::filesystem::path& recording, const SceneView& scene, const render::Look& look = {});
 
-  /// Session time of the last message [s].
-  [[nodiscard]] double end_s() const { return end_s_; }
+  /// What the recording shows.
+  [[nodiscard]] const RecordedSpan& span() const { return span_; }
+  /// Session time of the last sample that is shown [s].
+  [[nodiscard]] double end_s() const { return span_.end_s; }
 
   /// Goes to a session time [s]. One before that of the last call begins again at the start of the recording, which
   /// takes longer.
@@ -43,7 +46,7 @@ class Projector {
   const render::Look look_;
   std::function<void(const RenderReplay&, double)> follow_;
   std::optional<RenderReplay> replay_;
-  double end_s_ = 0;
+  RecordedSpan span_;
   double at_s_ = 0;    ///< Where GoTo() went.
   double read_s_ = 0;  ///< Time of the newest message.
 };

@@ -39,18 +39,22 @@ class VideoMaker {
  public:
   VideoMaker(const VideoSettings& settings, const SceneView& scene)
       : settings_(settings), scene_(scene), projector_(settings.recording, scene) {
-    work_.end_s = settings.until_s >= 0 ? std::min(settings.until_s, projector_.end_s()) : projector_.end_s();
+    const PictureNumbers numbers(settings.recording, projector_.span(), settings.until_s, kPeriod_s);
+    count_ = numbers.count;
+    begin_s_ = static_cast<double>(numbers.first) * kPeriod_s;
+    const double until_s = settings.until_s >= 0 ? settings.until_s : projector_.end_s();
+    work_.end_s = std::min(until_s, projector_.end_s()) - begin_s_;
     projector_.OnMessage([this](const RenderReplay& replay, double time_s) {
-      if (time_s <= work_.end_s) chapters_.Follow(time_s, replay.handles(), replay.generator(), replay.event());
+      const double video_s = time_s - begin_s_;
+      if (video_s <= work_.end_s) chapters_.Follow(video_s, replay.handles(), replay.generator(), replay.event());
     });
   }
 
   VideoResult Make(const std::function<void(double)>& progress) {
-    const auto count = static_cast<std::uint64_t>(std::floor(work_.end_s * kVideoRate_Hz + 1e-6)) + 1;
     double due_s = 0;
-    for (std::uint64_t i = 0; i < count; ++i) {
+    for (std::uint64_t i = 0; i < count_; ++i) {
       const double time_s = static_cast<double>(i) * kPeriod_s;
-      if (time_s >= due_s || i + 1 == count) {
+      if (time_s >= due_s || i + 1 == count_) {
         Look(time_s);
         const double period_s = NextPeriod();
         periods_s_.push_back(period_s);
@@ -59,8 +63,8 @@ class VideoMaker {
       }
       file_->Add(picture_);
     }
-    result_.pictures = count;
-    result_.duration_s = static_cast<double>(count) * kPeriod_s;
+    result_.pictures = count_;
+    result_.duration_s = static_cast<double>(count_) * kPeriod_s;
     result_.draw_rate_Hz = 1 / Median(periods_s_);
     result_.chapters = chapters_.list();
     file_->Finish(std::string(scene_.name), result_.chapters, result_.duration_s);
@@ -70,7 +74,7 @@ class VideoMaker {
  private:
   void Look(double time_s) {
     const StopWatch reading;
-    projector_.GoTo(time_s);
+    projector_.GoTo(begin_s_ + time_s);
     work_.reading_s += reading.s();
     work_.at_s = time_s;
     ++work_.looks;
@@ -91,6 +95,8 @@ class VideoMaker {
   const VideoSettings& settings_;
   const SceneView& scene_;
   Projector projector_;
+  std::uint64_t count_ = 0;
+  double begin_s_ = 0;  // Session time of the first picture.
   Chapters chapters_;
   VideoWork work_;
   VideoResult result_;

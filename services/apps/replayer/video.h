@@ -29,9 +29,9 @@ struct VideoResult {
   std::vector<Chapter> chapters;
 };
 
-/// Draws the session at kVideoRate_Hz, in the scene's size and quality high. The video's time is session time. Throws
-/// InputError, MismatchError, and std::runtime_error when OpenGL is missing, ffmpeg fails, the recording has no tissue,
-/// or less than a picture a second would be ready in time.
+/// Draws the session at kVideoRate_Hz, in the scene's size and quality high. The video's time is session time, from the
+/// first tissue on if the recording begins late. Throws InputError, MismatchError, and std::runtime_error when OpenGL
+/// is missing, ffmpeg fails, the recording has no tissue, or less than a picture a second would be ready in time.
 VideoResult MakeVideo(const VideoSettings& settings, const SceneView& scene,
                       const std::function<void(double)>& progress);
 
@@ -43,7 +43,7 @@ struct VideoWork {
   double used_s = 0;     ///< Time used in all [s] …
   double reading_s = 0;  ///< … of which for reading the recording, which takes as long however few pictures are drawn.
   std::uint64_t looks = 0;
-  double at_s = 0, end_s = 0;  ///< Session time reached, and of the end [s].
+  double at_s = 0, end_s = 0;  ///< Time of the video reached, and of its end [s].
 };
 
 /// Session time between two pictures so that the video is ready before `within_s`: from a period of kVideoRate_Hz to a

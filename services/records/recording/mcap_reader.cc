@@ -8,7 +8,6 @@
 #include <cstring>
 #include <utility>
 
-#include "services/base/core/byte_stream.h"
 #include "services/base/core/error.h"
 #include "services/records/recording/mcap_format.h"
 
@@ -175,6 +174,19 @@ void McapReader::TakeChannel(std::uint16_t number, const McapChannel& channel) {
   if (const std::optional<PointCoding> coding = FindPointCoding(channel.metadata)) coders_.Add(number, *coding);
 }
 
+void McapReader::TakeIndex(ByteReader* from) {
+  const auto channel = from->Number<std::uint16_t>();
+  const auto bytes = from->Number<std::uint32_t>();
+  constexpr std::size_t kEntry = 2 * sizeof(std::uint64_t);  // Log time, place in the chunk.
+  for (std::size_t k = 0; k < bytes / kEntry && from->good(); ++k) {
+    const auto time_ns = from->Number<std::uint64_t>();
+    (void)from->Number<std::uint64_t>();
+    if (!from->good()) break;
+    Span& span = spans_.try_emplace(channel, Span{time_ns, time_ns}).first->second;
+    span = {std::min(span.first_ns, time_ns), std::max(span.last_ns, time_ns)};
+  }
+}
+
 bool McapReader::Decode(McapMessage* message) {
   if (!coders_.Has(message->channel)) return true;
   const bool has_room = chunk_decoded_ <= kMostChunkBytes;
@@ -223,6 +235,9 @@ bool McapReader::Take(const Record& record, McapMessage* message) {
       metadata_[std::move(name)] = from.Texts();
       break;
     }
+    case Opcode::kMessageIndex:
+      if (depth_ == Depth::kChunkHeads) TakeIndex(&from);
+      break;
     default:
       break;
   }

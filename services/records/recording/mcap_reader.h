@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "services/base/core/byte_stream.h"
 #include "services/records/recording/point_coding.h"
 
 namespace fulcrum::recording {
@@ -48,7 +49,7 @@ class McapReader {
  public:
   enum class Depth {
     kMessages,
-    kChunkHeads,  ///< Skips the content of chunks and returns no message: fast, for first_ns, last_ns and metadata.
+    kChunkHeads,  ///< Skips the content of chunks and returns no message: fast, for times and metadata.
   };
   /// Throws InputError if the file cannot be read or does not begin as an MCAP file.
   explicit McapReader(const std::filesystem::path& file, Depth depth = Depth::kMessages);
@@ -74,6 +75,11 @@ class McapReader {
   /// First and last log time of the chunks read so far; 0: none.
   [[nodiscard]] std::uint64_t first_ns() const { return first_ns_; }
   [[nodiscard]] std::uint64_t last_ns() const { return last_ns_; }
+  /// First and last log time of the messages of each channel, by the indexes behind the chunks; with kChunkHeads only.
+  struct Span {
+    std::uint64_t first_ns, last_ns;
+  };
+  [[nodiscard]] const std::map<std::uint16_t, Span>& spans() const { return spans_; }
   /// Whether the file ends with a footer, so that its writer has closed it.
   [[nodiscard]] bool closed() const { return closed_; }
 
@@ -96,6 +102,7 @@ class McapReader {
   bool Take(const Record& record, McapMessage* message);
   void OpenChunk(const Record& record);
   void TakeChannel(std::uint16_t number, const McapChannel& channel);
+  void TakeIndex(ByteReader* from);
   /// Decodes the message if it is coded; false if that fails.
   bool Decode(McapMessage* message);
   void Fault(std::string what);
@@ -105,6 +112,7 @@ class McapReader {
   const Depth depth_;
   std::ifstream in_;
   std::uint64_t first_ns_ = 0, last_ns_ = 0;
+  std::map<std::uint16_t, Span> spans_;
   /// Size of the file, position of the next record, position of the present one.
   std::uint64_t size_ = 0, next_ = 0, at_ = 0;
   std::vector<std::uint8_t> content_, chunk_;

@@ -346,10 +346,10 @@ TEST(Lerobot, TakesNoSampleThatANodeRefuses) {
     if (!spoilt) good.push_back(sample);
   }
   ASSERT_EQ(good.size() + 3, static_cast<std::size_t>(number));
-  const RecordedKinematics read = ReadKinematics(session.recording(), session.scene());
-  EXPECT_NEAR(read.end_s, 0.7, 0.002);
+  EXPECT_NEAR(ReadSpan(session.recording(), session.scene()).end_s, 0.7, 0.002);
+  const Kinematics read = ReadKinematics(session.recording(), session.scene(), 0.7);
   for (int ms = 0; ms < 700; ++ms) {
-    const Vec3d tip_W = read.kinematics.At(testing::kCartStart_ns + 1'000'000 * ms).tools[0].tip_W;
+    const Vec3d tip_W = read.At(testing::kCartStart_ns + 1'000'000 * ms).tools[0].tip_W;
     EXPECT_NEAR((tip_W - TipAt(good, 0, 1e-3 * ms)).norm(), 0, 2e-6) << ms << " ms";
   }
 }
