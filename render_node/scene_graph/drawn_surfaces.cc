@@ -19,15 +19,17 @@
 namespace fulcrum::render {
 namespace {
 
-constexpr std::array<std::string_view, 14> kSurfaces{"rectum", "organ",      "fat",          "membrane", "cut",
-                                                     "clip",   "tube",       "hook",         "grasper",  "jaw",
-                                                     "blade",  "instrument", "surroundings", "breathing"};
+/// Of tissue and surroundings. All that is named below a tool is a part of it.
+constexpr std::array<std::string_view, 8> kSurfaces{"rectum", "organ", "fat",          "membrane",
+                                                    "cut",    "clip",  "surroundings", "breathing"};
 constexpr std::array<std::string_view, 1> kBurns{"burn"};
 
 class Collector final : public osg::NodeVisitor {
  public:
-  /// @param names of the surfaces that are collected; they must outlive it.
-  explicit Collector(std::span<const std::string_view> names) : osg::NodeVisitor(TRAVERSE_ALL_CHILDREN), names_(names) {
+  /// @param names of the surfaces of no tool that are collected; they must outlive it.
+  /// @param tools whether those of tools are collected.
+  Collector(std::span<const std::string_view> names, bool tools)
+      : osg::NodeVisitor(TRAVERSE_ALL_CHILDREN), names_(names), tools_(tools) {
     setNodeMaskOverride(~0u);  // Cameras rest when they have drawn.
   }
 
@@ -43,7 +45,9 @@ class Collector final : public osg::NodeVisitor {
     tool_ = tool;
   }
   void apply(osg::Geometry& geometry) override {
-    if (std::find(names_.begin(), names_.end(), geometry.getName()) == names_.end()) return;
+    const bool wanted = tool_ >= 0 ? tools_ && !geometry.getName().empty()
+                                   : std::find(names_.begin(), names_.end(), geometry.getName()) != names_.end();
+    if (!wanted) return;
     // The fixed surroundings are there for two backgrounds; the jaws of an instrument share a mesh.
     if (tool_ < 0 && !seen_.insert(&geometry).second) return;
     // The sheet is one surface in several runs of triangles.
@@ -92,6 +96,7 @@ class Collector final : public osg::NodeVisitor {
   }
 
   std::span<const std::string_view> names_;
+  const bool tools_;
   std::set<const osg::Geometry*> seen_;
   const osg::Array* last_ = nullptr;  // Positions of the last surface.
   osg::Matrix place_;
@@ -102,13 +107,13 @@ class Collector final : public osg::NodeVisitor {
 }  // namespace
 
 std::vector<DrawnSurface> DrawnSurfaces(osg::Node* root) {
-  Collector collector(kSurfaces);
+  Collector collector(kSurfaces, true);
   root->accept(collector);
   return std::move(collector.surfaces);
 }
 
 std::optional<DrawnSurface> DrawnBurn(osg::Node* root) {
-  Collector collector(kBurns);
+  Collector collector(kBurns, false);
   root->accept(collector);
   if (collector.surfaces.empty() || collector.surfaces.front().triangles.empty()) return std::nullopt;
   return std::move(collector.surfaces.front());

@@ -370,19 +370,24 @@ Channel Truth::FlowTo(const Truth& next) const {
     if (!stays.At(hit, [&](const Hit& first) { return IsSame(first, then); })) return;
     const Triangle& triangle = surfaces_[static_cast<std::size_t>(hit.surface)].triangles[hit.triangle];
     const auto [place, depth] = next.PlaceOf(Between(then->positions_W, triangle, hit));
-    if (depth <= 0) return;
-    const double right = place.x() - (x + 0.5), down = (camera().height - place.y()) - (y + 0.5);
-    const double u = 32768 + right / kFlowUnit_px, v = 32768 + down / kFlowUnit_px;
-    if (u < 1 || v < 1 || u > 65535 || v > 65535) return;
-    pixel[0] = Rounded(u, 65535);
-    pixel[1] = Rounded(v, 65535);
+    if (depth <= 0) {  // Behind the camera.
+      pixel[2] = static_cast<std::uint16_t>(FlowState::kHidden);
+      return;
+    }
     const auto is_same = [&](double apart_m) {
       // The footprint, which takes longer to compute, is never less than that of a surface that faces the camera.
       return apart_m < kSamePlace * static_cast<double>(hit.depth_m) / camera().focal ||
              apart_m < kSamePlace * Footprint(hit);
     };
-    pixel[2] = static_cast<std::uint16_t>(next.StateOf(place, depth, then, MaterialOf(hit), is_same));
-    if (pixel[2] == static_cast<std::uint16_t>(FlowState::kNone)) pixel[0] = pixel[1] = 0;
+    FlowState state = next.StateOf(place, depth, then, MaterialOf(hit), is_same);
+    const double right = place.x() - (x + 0.5), down = (camera().height - place.y()) - (y + 0.5);
+    const double u = 32768 + right / kFlowUnit_px, v = 32768 + down / kFlowUnit_px;
+    const bool holds = u >= 1 && v >= 1 && u <= 65535 && v <= 65535;
+    if (state == FlowState::kVisible && !holds) state = FlowState::kFar;
+    pixel[2] = static_cast<std::uint16_t>(state);
+    if (state == FlowState::kNone || !holds) return;
+    pixel[0] = Rounded(u, 65535);
+    pixel[1] = Rounded(v, 65535);
   });
 }
 

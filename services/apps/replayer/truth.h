@@ -42,7 +42,12 @@ inline constexpr int kFirstToolInstance = 16, kFirstOrganInstance = 32, kFirstCl
 inline constexpr double kDepthUnit_m = 2e-5;        ///< Of a depth image; 0: nothing.
 inline constexpr double kFlowUnit_px = 1.0 / 64;    ///< Of a flow image, whose zero is 32768.
 inline constexpr double kTemperatureUnit_C = 0.01;  ///< Of a temperature image; 0: unknown.
-enum class FlowState : std::uint16_t { kNone, kVisible, kHidden };
+enum class FlowState : std::uint16_t {
+  kNone,
+  kVisible,
+  kHidden,  ///< Or outside the field.
+  kFar      ///< Visible, but farther away than a flow image can tell.
+};
 
 /// For LaparoscopeView::SetDetail(): tissue is drawn alike in all pictures, within a sixteenth of half a pixel.
 inline constexpr float kTruthDetail = 16;
@@ -92,7 +97,8 @@ class Truth {
   [[nodiscard]] Channel Depth() const;
   /// Unit normals of the triangles, facing the camera, in the frame of world_to_camera(); 127.5 (n + 1).
   [[nodiscard]] Channel Normals() const;
-  /// Displacement to the picture `next`, right and down [kFlowUnit_px], and a FlowState.
+  /// Displacement to the picture `next`, right and down [kFlowUnit_px], and a FlowState. Both displacements are 0,
+  /// which is none, in the states kNone and kFar, and of what lies behind the camera or farther away than can be told.
   [[nodiscard]] Channel FlowTo(const Truth& next) const;
   /// Of membrane, fat, and the charts of solids that have a burn; 0 elsewhere. Taken when the object is made.
   [[nodiscard]] const Channel& temperature() const { return temperature_; }
