@@ -34,7 +34,7 @@ class Dataset:
 
     def points_W(self, frame):
         """Point of each pixel in frame W [m], (rows, columns, 3)."""
-        c, z = self.calibration, self.depth_m(frame)
+        c, z = self.frames[frame], self.depth_m(frame)  # Its focal length: a held scope has a zoom ring.
         v, u = np.indices(z.shape) + 0.5
         points = np.stack([(u - c["cx"]) / c["fx"] * z, (v - c["cy"]) / c["fy"] * z, z], axis=-1)
         pose = np.linalg.inv(np.array(self.frames[frame]["world_to_camera"]))

@@ -50,14 +50,17 @@ std::string KeypointText(const char* name, const Vec3d& p_W, double radius_m, co
          Format(", \"visible\": %s}", truth.Sees(p_W, radius_m + kAxisMargin_m) ? "true" : "false");
 }
 
+std::string Intrinsics(const render::Pinhole& camera, const char* separator) {
+  return Format("\"fx\": %.6f", camera.focal) + separator + Format("\"fy\": %.6f", camera.focal) + separator +
+         Format("\"cx\": %.3f", camera.centre_x) + separator + Format("\"cy\": %.3f", camera.height - camera.centre_y);
+}
+
 }  // namespace
 
 std::string CalibrationText(const render::Pinhole& camera, double baseline_m, std::span<const Solid> solids) {
-  std::string text = Format(
-      "{\n  \"width\": %d,\n  \"height\": %d,\n  \"fx\": %.6f,\n  \"fy\": %.6f,\n  \"cx\": %.3f,\n  \"cy\": %.3f,\n"
-      "  \"field_radius\": %.3f,\n  \"baseline_m\": %.6f,\n",
-      camera.width, camera.height, camera.focal, camera.focal, camera.centre_x, camera.height - camera.centre_y,
-      camera.radius, baseline_m);
+  std::string text = Format("{\n  \"width\": %d,\n  \"height\": %d,\n  ", camera.width, camera.height) +
+                     Intrinsics(camera, ",\n  ") +
+                     Format(",\n  \"field_radius\": %.3f,\n  \"baseline_m\": %.6f,\n", camera.radius, baseline_m);
   text += Format(
       "  \"depth_unit_m\": %g,\n  \"flow_unit_px\": %g,\n  \"flow_zero\": 32768,\n  \"temperature_unit_C\": %g,\n",
       kDepthUnit_m, kFlowUnit_px, kTemperatureUnit_C);
@@ -88,7 +91,8 @@ std::string FrameText(std::uint64_t frame, double time_s, const FrameState& stat
   std::string text =
       Format("{\"frame\": %llu, \"time_s\": %.6f, \"world_to_camera\": ", static_cast<unsigned long long>(frame),
              time_s) +
-      Matrix(truth.world_to_camera()) + Format(", \"pedals\": %u, \"tools\": [", state.handles.pedals);
+      Matrix(truth.world_to_camera()) + ", " + Intrinsics(truth.camera(), ", ") +
+      Format(", \"pedals\": %u, \"tools\": [", state.handles.pedals);
   const char* separator = "";
   for (std::size_t k = 0; k < kMaxTools; ++k) {
     const ToolSample& tool = state.tools[k];

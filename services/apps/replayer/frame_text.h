@@ -11,7 +11,8 @@
 
 namespace fulcrum::replay {
 
-/// Intrinsics of both cameras, units of the images, names of the classes and of the organs that have instances.
+/// Intrinsics of both cameras in the first frame, units of the images, names of the classes and of the organs that have
+/// instances.
 [[nodiscard]] std::string CalibrationText(const render::Pinhole& camera, double baseline_m,
                                           std::span<const Solid> solids);
 
@@ -24,7 +25,8 @@ struct FrameState {
   std::array<double, kMaxTools> force_N{};  ///< Of the tissue on each tool.
 };
 
-/// One line: time, camera, and each instrument's pose, jaw, force and keypoints.
+/// One line: time, camera with its intrinsics, which the zoom ring of a held scope changes, and each instrument's pose,
+/// jaw, force and keypoints.
 [[nodiscard]] std::string FrameText(std::uint64_t frame, double time_s, const FrameState& state, const SceneView& scene,
                                     const Truth& truth);
 

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 
 #include "services/apps/replayer/assertion.h"
 #include "services/apps/replayer/command_line.h"
@@ -54,14 +55,54 @@ std::vector<std::filesystem::path> RecordingsOf(const CommandLine& line) {
   return recordings;
 }
 
+constexpr std::array<const char*, 7> kKinds{"into", "live", "film", "video", "dataset", "lerobot", "test"};
+
 void CheckKind(const CommandLine& line) {
   int kinds = 0;
-  for (const char* kind : {"into", "live", "film", "video", "dataset", "lerobot", "test"})
-    kinds += line.Has(kind) ? 1 : 0;
+  for (const char* kind : kKinds) kinds += line.Has(kind) ? 1 : 0;
   if (kinds != 1)
     throw InputError(
         "give one of --into NODE..., --live, --film, --video FILE, --dataset DIR, --lerobot DIR and --test NODE; see "
         "--help");
+}
+
+/// The kinds of replay that read an option. --quiet goes with all.
+struct OptionKinds {
+  const char* option;
+  std::vector<std::string> kinds;
+};
+const std::vector<OptionKinds> kOptionKinds{{"within", {"video"}},
+                                            {"every", {"dataset"}},
+                                            {"baseline", {"dataset"}},
+                                            {"vary", {"dataset"}},
+                                            {"seed", {"dataset"}},
+                                            {"expect", {"test"}},
+                                            {"assert", {"test"}},
+                                            {"junit", {"test"}},
+                                            {"set", {"into"}},
+                                            {"console", {"into"}},
+                                            {"only", {"live"}},
+                                            {"except", {"live"}},
+                                            {"domain", {"live"}},
+                                            {"from", {"live"}},
+                                            {"frames", {"into", "test"}},
+                                            {"threads", {"into", "test"}},
+                                            {"rate", {"into", "test"}},
+                                            {"until", {"into", "test", "video", "dataset", "lerobot"}},
+                                            {"json", {"into", "video", "dataset", "lerobot"}},
+                                            {"cart", {"into", "test", "live"}},
+                                            {"scene", {"into", "test", "video", "dataset", "lerobot", "film"}}};
+
+/// Throws InputError for an option that the kind of replay would ignore. @pre CheckKind().
+void RefuseForeignOptions(const CommandLine& line) {
+  for (const auto& [option, kinds] : kOptionKinds) {
+    const auto given = [&](const std::string& kind) { return line.Has(kind.c_str()); };
+    if (!line.IsGiven(option) || std::any_of(kinds.begin(), kinds.end(), given)) continue;
+    const auto kind = std::find_if(kKinds.begin(), kKinds.end(), given);
+    std::string problem = std::string("--") + option + " cannot be combined with --" + *kind + "; it goes with";
+    for (const std::string& other : kinds) problem += (other == kinds.front() ? " --" : ", --") + other;
+    throw InputError(problem);
+  }
 }
 
 LiveSettings LiveSettingsFrom(const CommandLine& line) {
@@ -80,11 +121,8 @@ LiveSettings LiveSettingsFrom(const CommandLine& line) {
 
 /// Demands of a test.
 void ReadDemands(const CommandLine& line, Options* options) {
-  const bool asked = line.Has("expect") || line.Has("assert") || !line.TextOf("junit").empty();
-  if (!options->test && asked) throw InputError("--expect, --assert and --junit go with --test");
   if (!options->test) return;
   if (options->lock_step.nodes.size() != 1) throw InputError("--test takes exactly one node");
-  if (line.Has("set") || line.Has("console")) throw InputError("--test cannot be combined with --set or --console");
   if (line.Has("expect")) options->demands.state_hash = ParseStateHash(line.TextOf("expect"));
   for (const std::string& text : line.TextsOf("assert")) options->demands.assertions.push_back(ParseAssertion(text));
   options->junit = line.TextOf("junit");
@@ -94,6 +132,7 @@ void ReadDemands(const CommandLine& line, Options* options) {
 void ReadPictures(const CommandLine& line, Options* options) {
   options->pictures = std::erase(options->lock_step.nodes, NodeId::kRender) > 0;
   options->frames = line.TextOf("frames");
+  if (line.IsGiven("frames") && !options->pictures) throw InputError("--frames goes with node render, which draws");
   if (options->frames.empty() && !options->test) {
     options->frames = options->lock_step.recording.parent_path() / "replayed_frames";
   }
@@ -119,6 +158,9 @@ void ReadVariant(const CommandLine& line, Options* options) {
   options->console = line.Has("console");
   if (options->console && !(options->changes.empty() && line.TextOf("json").empty())) {
     throw InputError("--console cannot be combined with --set or --json");
+  }
+  if (options->console && line.IsGiven("until")) {
+    throw InputError("--console cannot be combined with --until; give the time to its command: go S");
   }
 }
 
@@ -165,11 +207,6 @@ void ReadLerobot(const CommandLine& line, Options* options) {
   if (options->lerobot.folder.empty()) {
     throw InputError("--lerobot: needs the name of a new folder, for example lerobot");
   }
-  for (const char* option : {"every", "baseline", "vary", "seed"}) {
-    if (line.IsGiven(option)) {
-      throw InputError(std::string("--") + option + " cannot be combined with --lerobot; it goes with --dataset");
-    }
-  }
   for (const std::filesystem::path& recording : RecordingsOf(line)) {
     options->lerobot.sessions.push_back({recording, SceneOf(line, recording), {}});
   }
@@ -197,6 +234,7 @@ Options ParseOptions(int argc, char** argv) {
   }
   options.lock_step.recording = RecordingsOf(line).front();
   CheckKind(line);
+  RefuseForeignOptions(line);
   options.live = line.Has("live");
   options.test = line.Has("test");
   options.film = line.Has("film");
