@@ -114,6 +114,8 @@ class Recording final : public Target {
         tool();
       } catch (const InputError&) {
         // Reported to the user.
+      } catch (const MismatchError&) {
+        // Messages of another schema: reported as well.
       }
     };
     tell([&] { log_tools::PrintInfo(file, &out); });
