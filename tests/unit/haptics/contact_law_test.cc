@@ -94,25 +94,30 @@ TEST(ContactLaw, StickingPullsBackToTheAnchor) {
   ContactForce force;
   for (int i = 0; i < 300; ++i) force = StepContact(law, Vec3d(0, 0, -0.003), i * kDt, kDt, &state);
   for (int i = 0; i < 2000; ++i) force = StepContact(law, Vec3d(2e-4, 0, -0.003), i * kDt, kDt, &state);
-  EXPECT_NEAR(force.f_W.x(), -2e-4 / (1.0 / 400 + 1.0 / 1000), 1e-6);
+  const double drag = 2e-4 / (1.0 / 400 + 1.0 / 1000);
+  EXPECT_NEAR(force.f_W.x(), -drag, 1e-6);
+  // Springs that are stretched by d under the force f store f d / 2, along the surface as well as across it.
+  EXPECT_NEAR(force.stored_J, 0.5 * force.f_W.z() * 0.003 + 0.5 * drag * 2e-4, 1e-7);
 }
 
-// A convex sphere of radius 20 mm touched at its top: sideways the depth decreases with the sphere and the normal
-// tilts.
+// A convex sphere of radius 20 mm touched at its top: sideways, along either tangent, the depth decreases with the
+// sphere and the normal tilts.
 TEST(ContactLaw, CurvatureFollowsASphere) {
   const double R = 0.02;
   Contact contact = TouchingPlane();
   contact.kappa1 = contact.kappa2 = static_cast<float>(1 / R);
   contact.kt = 0;
   contact.b_body = 0;
-  ContactState state;
-  const ContactLaw law = MakeContactLaw(contact, 0.0, &state);
   const double angle = 0.1;
-  const Vec3d outward(std::sin(angle), 0, std::cos(angle));
-  const Vec3d x = Vec3d(0, 0, -R) + (R - 0.001) * outward;
-  const Vec3d f = StepContact(law, x, kDt, kDt, &state).f_W;
-  EXPECT_NEAR(f.norm(), 0.001 / (1.0 / 500 + 1.0 / 1000), 0.02 * f.norm());  // Second order in the angle: 0.5 %.
-  EXPECT_GT(f.normalized().dot(outward), std::cos(0.02));
+  for (const Vec3d& aside : {Vec3d(1, 0, 0), Vec3d(0, 1, 0)}) {
+    ContactState state;
+    const ContactLaw law = MakeContactLaw(contact, 0.0, &state);
+    const Vec3d outward = std::sin(angle) * aside + Vec3d(0, 0, std::cos(angle));
+    const Vec3d x = Vec3d(0, 0, -R) + (R - 0.001) * outward;
+    const Vec3d f = StepContact(law, x, kDt, kDt, &state).f_W;
+    EXPECT_NEAR(f.norm(), 0.001 / (1.0 / 500 + 1.0 / 1000), 0.02 * f.norm());  // Second order in the angle: 0.5 %.
+    EXPECT_GT(f.normalized().dot(outward), std::cos(0.02));
+  }
 }
 
 TEST(ContactLaw, ForceAtTheReferenceIsTheReferenceForce) {
@@ -149,6 +154,7 @@ TEST(ContactLaw, GraspHoldsOnAllSidesAndSlipsAtItsForce) {
   ContactForce force;
   for (int i = 0; i < 1000; ++i) force = StepContact(law, pull, i * kDt, kDt, &state);
   EXPECT_LT((force.f_W + pull / (1.0 / 500 + 1.0 / 1000)).norm(), 1e-6);
+  EXPECT_NEAR(force.stored_J, 0.5 * pull.norm() * pull.norm() / (1.0 / 500 + 1.0 / 1000), 1e-8);  // f d / 2
   force = StepContact(law, 10 * pull, 1.0, kDt, &state);
   EXPECT_NEAR(force.f_W.norm(), 1.5, 1e-9);
   for (int i = 1; i < 100; ++i) {
@@ -190,6 +196,13 @@ TEST(ContactLaw, BeyondItsRadiusTheWallEnds) {
   const ContactLaw law = MakeContactLaw(contact, 0.0, &state);
   EXPECT_GT(StepContact(law, Vec3d(0.0099, 0, -0.002), kDt, kDt, &state).f_W.z(), 0.5);
   EXPECT_EQ(StepContact(law, Vec3d(0.0201, 0, -0.002), kDt, kDt, &state).f_W.norm(), 0.0);
+  // It ends gradually: halfway between one and two radii a smoothstep is 1/2.
+  const auto first = [&](double aside) {
+    ContactState fresh;
+    const ContactLaw of_fresh = MakeContactLaw(contact, 0.0, &fresh);
+    return StepContact(of_fresh, Vec3d(aside, 0, -0.002), kDt, kDt, &fresh).f_W.z();
+  };
+  EXPECT_NEAR(first(0.015) / first(0), 0.5, 1e-6);
 }
 
 // The law against tissue integrated explicitly at 20 us, over presses, slides and pulls.

@@ -117,5 +117,41 @@ TEST_F(LocalModelTest, LearnsTheStiffnessThatMessagesImply) {
   EXPECT_LT(worst_after(600), 0.25 * worst_after(40));
 }
 
+TEST_F(LocalModelTest, TheForceEndsAtTheCapOfTheMessage) {
+  LocalModel model;
+  DeviceContacts contacts = One(tissue.Report());
+  contacts.force_cap_N = 0.2f;
+  ASSERT_GT(tissue.force().norm(), 0.3);
+  Take(&model, contacts, kMessage, kMessage + 1);
+  ModelForce force;
+  for (std::uint64_t now = kMessage + 1; now < kMessage + 20; ++now) force = Step(&model, now);
+  EXPECT_NEAR(force.f_W.norm(), 0.2, 1e-6);
+}
+
+// Contacts of a device act in parallel: both together are as stiff at the hand as one alone may be. A lever of 1.
+TEST_F(LocalModelTest, TwoStiffContactsShareTheStiffnessOfTheHand) {
+  constexpr double kBody = 2e5, kDepth_m = 0.001;
+  Contact stiff;
+  stiff.kind = ContactKind::kSurface;
+  stiff.k1 = 2e4f;
+  stiff.k_body = static_cast<float>(kBody);
+  stiff.b_body = 1;
+  for (const std::uint32_t count : {1u, 2u}) {
+    DeviceContacts contacts;
+    contacts.count = count;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      contacts.contacts[i] = stiff;
+      contacts.contacts[i].id = i + 1;
+    }
+    LocalModel model;
+    HandMapping hand;
+    hand.pose = PoseFromAttachPoint(testing::BenchTrocar(), AttachPointForTip(testing::BenchTrocar(), Vec3d::Zero()));
+    model.Accept(contacts, TickAt(0).stamp_ns, TickAt(0).stamp_ns, hand, ring);
+    ModelForce force;
+    for (std::uint64_t now = 1; now < 30; ++now) force = model.Step(Vec3d(0, 0, -kDepth_m), TickAt(now).stamp_ns, kDt);
+    EXPECT_NEAR(force.f_W.z(), kDepth_m / (1 / kMaxHandStiffness_N_m + 1 / (count * kBody)), 1e-4) << count;
+  }
+}
+
 }  // namespace
 }  // namespace fulcrum::haptics

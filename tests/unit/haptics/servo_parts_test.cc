@@ -226,7 +226,7 @@ TEST(Passivity, AnActiveSourceIsDampedOnceTheTankIsEmpty) {
   Vec3d sent = Vec3d::Zero();
   double given = 0;
   Vec3d x = Vec3d::Zero();
-  for (int i = 1; i <= 5000; ++i) {
+  for (int i = 1; i <= 20000; ++i) {
     const Vec3d next(0.002 * std::sin(2 * M_PI * 3 * i * kDt), 0, 0);
     const Vec3d moved = next - x;
     x = next;
@@ -234,7 +234,8 @@ TEST(Passivity, AnActiveSourceIsDampedOnceTheTankIsEmpty) {
     const Vec3d active = 0.8 * moved / kDt;  // Negative viscosity of 0.8 N s/m.
     sent = controller.Step(active, sent, moved, 0.0, 0.0, kDt);
   }
-  EXPECT_LE(given, kTank_J + 1e-3);
+  // Left alone the source gives 0.8 * mean(v^2) * 20 s = 11 mJ.
+  EXPECT_LE(given, kTank_J + 1e-4);
 }
 
 // Breathing tissue does work on a hand that gives way; physics declares this power.

@@ -32,6 +32,26 @@ using testing::TickAt;
 using testing::TissueParameters;
 using testing::UnrestAtTheWall;
 
+/// A model of one surface across z, of a tool sample at `then`: `gap` beneath the tip in the origin, or touched with a
+/// normal force.
+ContactModel SurfaceModel(std::uint64_t sequence, const Tick& then, float gap, float force_N) {
+  ContactModel model;
+  model.stamp = {sequence + 1, 1, then.stamp_ns};
+  model.tool_stamp_ns = then.stamp_ns;
+  model.devices[0].count = 1;
+  Contact& contact = model.devices[0].contacts[0];
+  contact.kind = ContactKind::kSurface;
+  contact.id = 1;
+  contact.k1 = 500;
+  contact.k_body = 1000;
+  contact.b_body = 5;
+  contact.gap = gap;
+  contact.p_s.z() = -gap;
+  contact.f_ref.z() = force_N;
+  contact.u_c.z() = -force_N / contact.k_body;
+  return model;
+}
+
 TEST(Servo, RefusesAShaftTooShortToTurnAbout) {
   SceneView scene = BenchScene(1);
   scene.tools[0].shaft_length_m = 0.02f;
@@ -249,6 +269,56 @@ TEST(Servo, StallOfPhysicsFadesForcesAndBringsThemBackSoftly) {
   for (std::size_t i = 5; i < forces.size(); ++i) EXPECT_LE(forces[i] - forces[i - 5], 0.1 + 1e-9) << i;
   EXPECT_NEAR(forces.back(), pressed, 0.02 * pressed);
   EXPECT_EQ(loop.servo.figures().state, ServoState::kNormal);
+}
+
+// Models that are 40 to 100 ms old damp the hand: kHoldDamping (DESIGN.md) against the hand's own motion. Through its
+// pivot a tip that goes to +x takes the hand to -x, at equal speed where the lever is 1.
+TEST(Servo, OldModelsDampTheHand) {
+  constexpr double kSpeed_m_s = 0.05;
+  GuidedDevice device(BenchTrocar(), [](double t) { return Vec3d(kSpeed_m_s * (t - 0.8), 0, 0); });
+  Servo servo(ServoSettingsOf(BenchScene(1)), {&device, nullptr});
+  for (std::uint64_t i = 0; i <= 800; ++i) {
+    const Tick tick = TickAt(i);
+    if (i % 10 == 0 && i > 70) servo.OfferModel(SurfaceModel(i, TickAt(i - 60), 0.05f, 0), tick.stamp_ns);
+    servo.Step(tick);
+  }
+  EXPECT_EQ(servo.figures().state, ServoState::kHold);
+  EXPECT_NEAR(device.force.x(), kHoldDamping_Ns_m * kSpeed_m_s, 0.02 * kHoldDamping_Ns_m * kSpeed_m_s);
+  EXPECT_LT(device.force.tail<2>().norm(), 1e-3);
+}
+
+// Tissue that carries the hand with 1 N and 10 mm/s gives it 10 mW. As physics declares this power, the hand feels all
+// of the force; undeclared it is damped as much as the passivity controller may.
+TEST(Servo, TissueThatMovesTheHandIsNotDampedAway) {
+  constexpr double kSpeed_m_s = 0.01;
+  const auto height = [](double t) { return -0.006 + kSpeed_m_s * std::max(0.0, t - 1.0); };
+  const auto felt = [&](float declared_W) {
+    GuidedDevice device(BenchTrocar(), [&](double t) { return Vec3d(0, 0, height(t)); });
+    Servo servo(ServoSettingsOf(BenchScene(1)), {&device, nullptr});
+    for (std::uint64_t i = 0; i < 1400; ++i) {
+      const Tick tick = TickAt(i);
+      if (i % 10 == 0) {
+        ContactModel model = SurfaceModel(i, TickAt(i), 0, 1);
+        model.devices[0].contacts[0].x_ref.z() = static_cast<float>(height(tick.session_time_s));
+        model.devices[0].p_ext_W = declared_W;
+        servo.OfferModel(model, tick.stamp_ns);
+      }
+      servo.Step(tick);
+    }
+    return device.force.z();
+  };
+  const double declared = felt(0.02f);
+  EXPECT_GT(declared, 0.95);
+  EXPECT_NEAR(declared - felt(0), kMaxPassivityDamping_Ns_m * kSpeed_m_s, 0.1 * kMaxPassivityDamping_Ns_m * kSpeed_m_s);
+}
+
+// A tip 200 mm beneath its pivot that moves at 20 mm/s turns its tool at 0.1 rad/s: v = w x r.
+TEST(Servo, PublishesHowFastATurningToolTurns) {
+  GuidedDevice device(BenchTrocar(), [](double t) { return Vec3d(0.02 * (t - 0.2), 0, 0); });
+  Servo servo(ServoSettingsOf(BenchScene(1)), {&device, nullptr});
+  for (std::uint64_t i = 0; i <= 200; ++i) servo.Step(TickAt(i));
+  const Vec3f w = servo.record().tool.tools[0].w_WT;
+  EXPECT_LT((w - Vec3f(0, -0.1f, 0)).norm(), 1e-3f) << w.transpose();
 }
 
 TEST(Servo, RestartOfPhysicsIsTakenUp) {
