@@ -118,6 +118,56 @@ TEST(Assessment, APhysicsNodeThatComesBackIsNoSlip) {
   EXPECT_EQ(ValueOf(run.assessor, Measure::kGraspSlips), 0);
 }
 
+/// Two graspers: a sum over the tools, a time from the first movement to the last, whichever tool moves.
+TEST(Assessment, WhatTwoToolsDoIsAdded) {
+  test::AssessedScene scene;
+  scene.view.tools[1].kind = ToolKind::kGrasper;
+  Assessor assessor(scene.view);
+  assessor.Begin(test::kStart_ns);
+  const auto reach = [](double since_s, double lasts_s) {
+    return Vec3d(0.1 * test::MinimumJerk(std::clamp(since_s / lasts_s, 0.0, 1.0)), 0, 0);
+  };
+  for (int i = 0; i < 6000; ++i) {
+    const double time_s = 1e-3 * i;
+    assessor.Add(ToolAt(time_s, reach(time_s - 1, 3), reach(time_s - 1.5, 1)));
+    if (i % 10 != 0) continue;
+    ContactModel model = test::GraspAt(time_s, Vec3d::Zero(), i > 2000 && i < 2500 ? 9 : 3, 8);
+    model.devices[1] = test::GraspAt(time_s, Vec3d::Zero(), i > 3000 && i < 3500 ? 9 : 3, 8).devices[0];
+    assessor.Add(model);
+  }
+  assessor.Finish();
+  const Figures figures = assessor.figures();
+  EXPECT_NEAR(ValueOf(assessor, Measure::kPathLength), 200, 1);
+  EXPECT_EQ(ValueOf(assessor, Measure::kGraspSlips), 2);
+  const double longer_s = figures.tool[0][static_cast<std::size_t>(Measure::kTime)];
+  EXPECT_GT(longer_s, 2);
+  EXPECT_EQ(ValueOf(assessor, Measure::kTime), longer_s) << "the short reach of tool 1 lies within that of tool 0";
+}
+
+/// An assistant (tool 0 keeps a traction by itself) swings, pulls too hard and loses tissue: none of it is the
+/// trainee's, who reaches once, in a second.
+TEST(Assessment, WhatAnAssistantDoesIsNotCounted) {
+  test::AssessedScene scene;
+  scene.view.tools[0].traction_N = 1;
+  Assessor assessor(scene.view);
+  assessor.Begin(test::kStart_ns);
+  for (int i = 0; i < 8000; ++i) {
+    const double time_s = 1e-3 * i, swing = 0.1 * std::sin(4 * time_s);
+    const double way = 0.1 * test::MinimumJerk(std::clamp(time_s - 3, 0.0, 1.0));
+    assessor.Add(ToolAt(time_s, Vec3d(swing, 0, 0), Vec3d(way, 0, 0)));
+    if (i % 10 != 0) continue;
+    ContactModel model = test::GraspAt(time_s, Vec3d::Zero(), i < 5000 ? 14 : 3, 8);
+    model.devices[1] = test::PushAt(time_s, 2).devices[1];
+    assessor.Add(model);
+    EXPECT_EQ(assessor.PromptsAt(time_s + 0.01), 0u) << time_s;
+  }
+  assessor.Finish();
+  EXPECT_NEAR(ValueOf(assessor, Measure::kPathLength), 100, 1);
+  EXPECT_NEAR(ValueOf(assessor, Measure::kPeakForce), 2, 1e-6);
+  EXPECT_LT(ValueOf(assessor, Measure::kTime), 1.1);
+  EXPECT_NEAR(ValueOf(assessor, Measure::kIdle), 7, 0.5);
+}
+
 TEST(Assessment, BurntSurfaceCountsByOrganAndFatIsNone) {
   test::AssessedScene scene;
   std::array<Solid, 3> solids{};
@@ -159,6 +209,21 @@ TEST(Assessment, PatchesThatOverlapAndComeAgainCountOnce) {
     run.assessor.Add(PatchAt(1 + i, 180, 210, block));
   }
   EXPECT_NEAR(ValueOf(run.assessor, Measure::kDamageBeyondMargin), 6, 0.05);
+}
+
+/// Collagen counts as coagulated at a damage integral of 1: a texel of 255 (1 - 1/e) = 161.2.
+TEST(Assessment, DamageCountsFromAnIntegralOfOne) {
+  for (const auto& [value, mm2] : {std::pair{160, 0.0}, {163, 6.0}}) {
+    Running run;
+    TemperaturePatch patch = PatchAt(1, 100, 200, [](const Eigen::Vector2d& at) {
+      return at.x() > 0.024 && at.x() < 0.026 && at.y() > 0.03 && at.y() < 0.033;
+    });
+    for (std::size_t k = 1; k < patch.texels.size(); k += 4) {
+      patch.texels[k] = static_cast<std::uint8_t>(patch.texels[k] == 200 ? value : 0);
+    }
+    run.assessor.Add(patch);
+    EXPECT_NEAR(ValueOf(run.assessor, Measure::kDamageBeyondMargin), mm2, 0.05) << value;
+  }
 }
 
 TEST(Assessment, WithoutALineNothingIsSaidOfIt) {
@@ -204,6 +269,20 @@ TEST(Prompts, SayWhatIsWrongWhileItIs) {
   event.kind = ThermalEventKind::kNerveInjury;
   run.assessor.Add(event);
   EXPECT_EQ(MostUrgent(run.assessor.PromptsAt(9)), "injury: stop");
+}
+
+TEST(Prompts, SayNerveOfANerve) {
+  test::AssessedScene scene;
+  scene.structures[0].kind = ProtectedKind::kNerve;
+  Assessor assessor(scene.view);
+  assessor.Begin(test::kStart_ns);
+  AddTip(5, Vec2f(0.03f, 0.04f), true, CauteryMode::kCut, &assessor);
+  EXPECT_EQ(assessor.PromptsAt(5.1), BitOf(Prompt::kNerveNear) | BitOf(Prompt::kOffLine));
+  ThermalEvent event;
+  event.session_time_s = 8;
+  event.kind = ThermalEventKind::kNerveWarning;
+  assessor.Add(event);
+  EXPECT_EQ(assessor.PromptsAt(8.1), BitOf(Prompt::kNerveHot));
 }
 
 TEST(Prompts, TheMostUrgentIsSaid) {
