@@ -121,6 +121,15 @@ TEST_F(RecordedSession, SameMessagesGiveTheSameFigures) {
   same(wanted.tool[0], got.figures.tool[0]);
   same(wanted.tool[1], got.figures.tool[1]);
   EXPECT_GT(known, 30);
+  // Both sides use the same Assessor; these figures of Play are known without it. Grasp at up to 6 N with a grip of 5
+  // N, 10 mm of rise in 2 s, then 2 N of pressure to the end.
+  const auto of = [&](Measure measure) { return got.figures.session[static_cast<std::size_t>(measure)]; };
+  EXPECT_NEAR(of(Measure::kPeakForce), 3 * 1.99, 1e-3);
+  EXPECT_NEAR(of(Measure::kForceTime), 3 * 1.99 * 1.99 / 2 + 2 * 2, 0.1);
+  EXPECT_NEAR(of(Measure::kLift), 5 * 1.99, 0.01);
+  EXPECT_EQ(of(Measure::kGraspSlips), 1);
+  EXPECT_EQ(of(Measure::kUreterWarnings), 9) << "one every half second from 0 to 4 s";
+  EXPECT_NEAR(of(Measure::kCutLength), 4, 1e-3) << "1 mm a second";
   EXPECT_GT(wanted.session[static_cast<std::size_t>(Measure::kDamageBeyondMargin)], 0);
 }
 
