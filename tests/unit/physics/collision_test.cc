@@ -176,7 +176,7 @@ class Still {
   /// The foot passes through the middle of the sheet, slanted, `along` further along x and `across` along y.
   [[nodiscard]] CauteryContact Through(float slant_deg, float along = 0, float across = 0) {
     const float slant = slant_deg * static_cast<float>(M_PI) / 180;
-    ToolPose pose = Down(kMiddle + Vec3f(along, across, 0) + 0.0025f * Vec3f(-std::cos(slant), 0, std::sin(slant)));
+    ToolPose pose = Down(kMiddle + Vec3f(along, across, lift_) + 0.0025f * Vec3f(-std::cos(slant), 0, std::sin(slant)));
     pose.q_WT = Quatf(Eigen::AngleAxisf(slant, Vec3f::UnitY())) * pose.q_WT;
     std::array<ToolCollision::ToolMotion, kMaxTools> motion;
     motion[1] = {ShapeOf(scene_.tools[1], pose), ShapeOf(scene_.tools[1], pose)};
@@ -197,6 +197,14 @@ class Still {
   }
   [[nodiscard]] float MarginAt(Index triangle) const { return collision_.MarginAt(triangle, ToolPart::kTip); }
   void SetOpenCells(const OpenCells& open) { collision_.SetOpenCells(open); }
+  /// Lifts the whole sheet, and the foot of the next Through() with it.
+  void Lift(float height_m) {
+    lift_ = height_m;
+    std::vector<float> xyz(3 * std::size_t{particles_.particle_count()});
+    particles_.CopyPositions(xyz);
+    for (std::size_t node = 0; node < kRows * kCols; ++node) xyz[3 * node + 2] = height_m;
+    particles_.SetAll(xyz, xyz);
+  }
   /// Severs the edges from `row` to the next row and moves all rows beyond by `gap_m` in y.
   void Open(Index row, float gap_m) {
     TopologyState slit;
@@ -223,7 +231,19 @@ class Still {
   TissueModel model_;
   ToolCollision collision_;
   CauteryProbe probe_;
+  float lift_ = 0;
 };
+
+/// A sheet more than 2 mm above the fat is tented: no current leaks and no heat sinks into the fat.
+TEST_F(OnSheet, ALiftedSheetIsTented) {
+  for (const auto& [height_m, tented] : {std::pair{0.0f, false}, {0.001f, false}, {0.003f, true}}) {
+    Still still(scene_);
+    still.Lift(height_m);
+    const CauteryContact contact = still.Through(30);
+    ASSERT_TRUE(contact.touching) << height_m;
+    EXPECT_EQ(contact.tented, tented) << height_m;
+  }
+}
 
 TEST_F(OnSheet, MetalThroughTheSheetCoversItsSection) {
   // Upright a disc; at 30 degrees to the sheet an ellipse, twice as long. A gap along the normal is reduced by half the
