@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <set>
 
 #include "physics_node/simulation/tissue_simulation.h"
@@ -136,18 +137,53 @@ TEST_F(Grasps, SlipsAboveTheGripOfItsJawAngleOnly) {
   }
 }
 
+/// One step of a second above the grip: 50 mm/s at twice the grip (assumed), of what is held fully. What is held less
+/// creeps the faster.
 TEST_F(Grasps, FirmlyHeldTissueSlipsLast) {
   Close(kMiddle);
   ASSERT_TRUE(grasp_.holding());
+  struct Before {
+    Vec3f p_T = Vec3f::Zero();
+    float hold = 0;
+  };
+  std::map<Index, Before> before;
   float least = 2, most = 0;
   for (const HeldParticle& held : grasp_.held()) {
     const float hold = grasp_.HoldOf(held, scene_.tools[0]);
+    before[held.particle] = {held.p_T, hold};
     least = std::min(least, hold);
     most = std::max(most, hold);
   }
   EXPECT_EQ(most, 1.0f);
   EXPECT_LT(least, 0.9f);
   EXPECT_GE(least, 0.3f);
+  const float grip = scene_.physics.grip_force_N;
+  const auto pull = [&](float force_N, float step_s) {
+    grasp_.Slip(Vec3f(0, 0, force_N), step_s, scene_.tools[0], Down(kMiddle, 0), model_, &particles_);
+  };
+  for (int i = 0; i < 100; ++i) pull(0.99f * grip, 0.01f);
+  pull(1.03f * grip, 1);
+  // The traction is low-passed with 30 ms.
+  const float excess = 0.99f + (1.03f - 0.99f) / 1.03f - 1, creep_m = 0.05f * excess;
+  ASSERT_GT(grasp_.held().size(), 5u);
+  for (const HeldParticle& held : grasp_.held()) {
+    const Before& was = before.at(held.particle);
+    EXPECT_NEAR((held.p_T - was.p_T).norm() * was.hold, creep_m, 0.02f * creep_m) << "hold " << was.hold;
+  }
+}
+
+/// The tool is turned by 90 degrees about y: traction along x of W draws the tissue along z of the tool.
+TEST_F(Grasps, TissueCreepsTheWayItIsDrawn) {
+  Close(kMiddle);
+  ASSERT_TRUE(grasp_.holding());
+  const Vec3f before = grasp_.held().front().p_T;
+  const ToolPose turned{kMiddle, Quatf(Eigen::AngleAxisf(static_cast<float>(M_PI / 2), Vec3f::UnitY())), 0};
+  for (int i = 0; i < 10; ++i) {
+    grasp_.Slip(Vec3f(1.2f * scene_.physics.grip_force_N, 0, 0), 0.01f, scene_.tools[0], turned, model_, &particles_);
+  }
+  const Vec3f crept = grasp_.held().front().p_T - before;
+  EXPECT_GT(crept.norm(), 1e-5f);
+  EXPECT_GT(crept.normalized().z(), 0.99f) << crept.transpose();
 }
 
 TEST_F(Grasps, NeverTakesOrKeepsWhatIsDead) {
