@@ -281,7 +281,8 @@ TEST_F(OnSmallScene, AToolThatJumpsIsFollowedAtALimitedSpeed) {
 
 TEST_F(OnSmallScene, ContactModelsPassTheGatesAndPushBack) {
   TissueSimulation simulation(scene_);
-  bool announced = false, pressed = false, grasped = false;
+  bool announced = false, pressed = false;
+  float pulled = 0;
   std::array<Vec3f, kMaxTools> last{Vec3f::Zero(), Vec3f::Zero()};
   for (int i = 0; i < 600; ++i) {
     simulation.Step(ScriptedTools(scene_, 0.01 * i));
@@ -299,13 +300,12 @@ TEST_F(OnSmallScene, ContactModelsPassTheGatesAndPushBack) {
             pressed = true;
             EXPECT_GT(contact.f_ref.dot(contact.n), 0.0f) << "step " << i;
           }
-        } else {
-          grasped = true;
         }
         // The reference force must not jump between steps, because the servo would pass the jump on. Of jaws that open
         // it renders no more than they still hold.
         const float most = contact.kind == ContactKind::kGrasp ? contact.slip_force : kLargestFinite;
         const Vec3f force = contact.f_ref * std::min(1.0f, most / std::max(contact.f_ref.norm(), 1e-6f));
+        if (contact.kind == ContactKind::kGrasp) pulled = std::max(pulled, force.norm());
         EXPECT_LT((force - last[tool]).norm(), 1.0f) << "step " << i;
         last[tool] = force;
       }
@@ -314,7 +314,7 @@ TEST_F(OnSmallScene, ContactModelsPassTheGatesAndPushBack) {
   }
   EXPECT_TRUE(announced);
   EXPECT_TRUE(pressed);
-  EXPECT_TRUE(grasped);
+  EXPECT_GT(pulled, 0.3f) << "a grasp of which more than nothing is rendered";
 }
 
 /// In air, nearer to the surface than physics last saw it, the servo's law gives no force.
@@ -386,7 +386,7 @@ TEST_F(OnSmallScene, AGraspPullsBackTowardsRest) {
 TEST_F(OnSmallScene, CauteryContactFollowsTheHook) {
   TissueSimulation simulation(scene_);
   int touching = 0;
-  float first = 0, last = 0;
+  float first = 0, last = 0, moved = 0;
   for (int i = 0; i < 480; ++i) {
     simulation.Step(ScriptedTools(scene_, 0.01 * i));
     CauteryContact contact = simulation.Cautery(1);
@@ -404,10 +404,11 @@ TEST_F(OnSmallScene, CauteryContactFollowsTheHook) {
       place += contact.barycentric[k] * scene_.membrane_material[nodes[k]];
     }
     EXPECT_LT((place - contact.material).norm(), 1e-6f);
-    EXPECT_LT(contact.material_rate.norm(), 0.1f);
+    moved += 0.01f * contact.material_rate.y();
   }
   EXPECT_GT(touching, 200);
   EXPECT_GT(last - first, 0.006f);  // The script moves 10 mm along the sheet.
+  EXPECT_NEAR(moved, last - first, 0.001f) << "the integral of the rate, which is low-passed";
 }
 
 TEST(ElasticForce, IsZeroAtRestAndThatOfTheContinuumWhenStretched) {
