@@ -87,9 +87,15 @@ TEST_F(NodeOverSolid, ABurnGivesAPatchOfItsOwnAtlasAndAnEvent) {
   EXPECT_GT(last.texels[4 * (y * kPatchTexels + x) + 1], 200) << "damage beneath the metal";
 }
 
-TEST_F(NodeOverSolid, AUreterIsWarnedOfOnceBeforeItIsInjured) {
+/// A plate that is a ureter or a nerve is warned of once, over a restart, before it is injured.
+class NodeOverStructure : public NodeOverSolid {
+ protected:
+  void WarnOnceThenInjure(SolidLook look, ThermalEventKind warning, ThermalEventKind injury);
+};
+
+void NodeOverStructure::WarnOnceThenInjure(SolidLook look, ThermalEventKind warning, ThermalEventKind injury) {
   std::vector<Solid> solids(1);
-  solids[0].look = SolidLook::kUreter;
+  solids[0].look = look;
   scene_.solids = solids;
   OpenCheckpoint();
   auto node = MakeNode();
@@ -99,18 +105,18 @@ TEST_F(NodeOverSolid, AUreterIsWarnedOfOnceBeforeItIsInjured) {
     while (bus_.event_in->TakeNext(&event)) {
       if (event.solid != 0) continue;
       kinds.push_back(event.kind);
-      if (event.kind == ThermalEventKind::kUreterWarning) {
+      if (event.kind == warning) {
         EXPECT_GE(event.temperature_C, kWarning_C);
         EXPECT_LT((event.material - chart_.Material({0.02f, 0.015f, -0.02f})).norm(), 2e-3f);
       }
     }
   };
   const auto count = [&](ThermalEventKind kind) { return std::ranges::count(kinds, kind); };
-  for (int n = 0; n < 400 && count(ThermalEventKind::kUreterWarning) == 0; ++n) {
+  for (int n = 0; n < 400 && count(warning) == 0; ++n) {
     Burn(node.get(), 0.02f, CauteryMode::kCoag, 2);
     take();
   }
-  ASSERT_EQ(count(ThermalEventKind::kUreterWarning), 1);
+  ASSERT_EQ(count(warning), 1);
   EXPECT_EQ(count(ThermalEventKind::kSolidBurn), 0) << "nothing is dead yet";
   EXPECT_EQ(MetricOf(*node, "warnings"), 1.0);
   for (int n = 0; n < 20; ++n) Step(node.get());  // Until the next checkpoint.
@@ -121,9 +127,17 @@ TEST_F(NodeOverSolid, AUreterIsWarnedOfOnceBeforeItIsInjured) {
   EXPECT_EQ(MetricOf(*node, "warnings"), 1.0);
   for (int n = 0; n < 150; ++n) Burn(node.get(), 0.02f);
   take();
-  EXPECT_EQ(count(ThermalEventKind::kUreterWarning), 1);
-  EXPECT_EQ(count(ThermalEventKind::kUreterInjury), 1);
+  EXPECT_EQ(count(warning), 1);
+  EXPECT_EQ(count(injury), 1);
   EXPECT_EQ(MetricOf(*node, "injuries"), 1.0);
+}
+
+TEST_F(NodeOverStructure, AUreterIsWarnedOfOnceBeforeItIsInjured) {
+  WarnOnceThenInjure(SolidLook::kUreter, ThermalEventKind::kUreterWarning, ThermalEventKind::kUreterInjury);
+}
+
+TEST_F(NodeOverStructure, ANerveIsWarnedOfOnceBeforeItIsInjured) {
+  WarnOnceThenInjure(SolidLook::kNerve, ThermalEventKind::kNerveWarning, ThermalEventKind::kNerveInjury);
 }
 
 TEST_F(NodeOverSolid, TheBurnOutlivesARestart) {
