@@ -21,6 +21,7 @@ ExitCode RunPhysics(app::NodeApp& app) {
       app.MakeInput<ToolState>(),       app.MakeInput<HandleState>(),  app.MakeInput<TopologyState>(),
       app.MakeInput<OpenCells>(),       app.MakeOutput<TissueFrame>(), app.MakeOutput<ContactModel>(),
       app.MakeOutput<CauteryContact>(), app.MakeOutput<TearState>(),   app.MakeOutput<TickManifest>(),
+      app.MakeOutput<ClipState>(),
   };
   const auto make = [&](bool follows, std::optional<physics::PhysicsNode>* node) {
     node->emplace(scene, ports, &checkpoint, epoch_ns, app.cart().timing(NodeId::kPhysics).threads, follows);

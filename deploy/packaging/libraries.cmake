@@ -26,9 +26,9 @@ fulcrum_component(core TARGETS fulcrum_core fulcrum_flags HEADERS services/base/
 fulcrum_component(scene TARGETS fulcrum_scene HEADERS services/scene/format services/scene/builder)
 fulcrum_component(tissue
   TARGETS fulcrum_physics_simulation fulcrum_physics_implicit fulcrum_physics_xpbd fulcrum_physics_pbd
-    fulcrum_physics_energy fulcrum_physics_collision fulcrum_physics_grasp fulcrum_physics_contact_model
+    fulcrum_physics_energy fulcrum_physics_collision fulcrum_physics_clips fulcrum_physics_grasp fulcrum_physics_contact_model
     fulcrum_physics_tear fulcrum_physics_tissue
-  HEADERS physics_node/collision physics_node/contact_model physics_node/energy physics_node/grasp physics_node/implicit
+  HEADERS physics_node/clips physics_node/collision physics_node/contact_model physics_node/energy physics_node/grasp physics_node/implicit
     physics_node/pbd physics_node/simd physics_node/simulation physics_node/tear physics_node/tissue physics_node/xpbd)
 fulcrum_component(thermal
   TARGETS fulcrum_thermal_coupling fulcrum_thermal_potential fulcrum_thermal_damage fulcrum_thermal_volume

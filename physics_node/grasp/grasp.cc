@@ -42,7 +42,7 @@ float Grasp::HoldOf(const HeldParticle& held, const ToolDescription& tool) const
 
 void Grasp::Update(const ToolDescription& tool, const ToolPose& pose, const TissueModel& model,
                    ParticleStore* particles) {
-  if (tool.kind != ToolKind::kGrasper) {
+  if (tool.kind != ToolKind::kGrasper && tool.kind != ToolKind::kClipApplier) {
     return;
   }
   if (state_ == State::kOpen && pose.jaw_rad < scene_.physics.grasp_close_rad) {
@@ -66,11 +66,12 @@ void Grasp::TakeHold(const ToolDescription& tool, const ToolPose& pose, Particle
       }
     }
   };
+  const bool clips = tool.kind == ToolKind::kClipApplier;
   const float radius = scene_.physics.grasp_radius_m, jaw = std::min(tool.tip_radius_m, radius);
   held_.clear();
   take(0, scene_.tube_vertex_count, jaw, 0.0f);
-  take(scene_.membrane.first, particles->particle_count(), jaw, radius);
-  if (held_.empty()) {
+  take(scene_.membrane.first, particles->particle_count(), jaw, clips ? 0.0f : radius);
+  if (held_.empty() && !clips) {
     take(0, scene_.tube_vertex_count, jaw, radius);
   }
   traction_.setZero();

@@ -1,4 +1,4 @@
-// Grasp of a grasper: particles fixed in the tool's frame, with slip above the grip force.
+// Grasp of a grasper or a clip applier: particles fixed in the tool's frame, with slip above the grip force.
 //
 //   G       = grip_force max(0, 1 - jaw / open)                              grip force [N]
 //   creep   = v_c h min(|T| / G - 1, kMaxExcess) T^ / hold_i  per step while |T| > G, in the tool's frame [m]
@@ -30,7 +30,8 @@ class Grasp {
 
   /// Begins a grasp when the jaws close below grasp_close_rad and ends it when they open beyond grasp_open_rad. Held
   /// are all particles within a jaw's thickness of the surface that the jaws span, in both layers and all sheets of a
-  /// fold, and the membrane within grasp_radius of their middle line; if there are none, the organ within grasp_radius.
+  /// fold, and of a grasper the membrane within grasp_radius of their middle line; if there are none, the organ within
+  /// grasp_radius.
   void Update(const ToolDescription& tool, const ToolPose& pose, const TissueModel& model, ParticleStore* particles);
   /// Moves the held particles with the tool.
   void Move(const ToolPose& pose, ParticleStore* particles) const;

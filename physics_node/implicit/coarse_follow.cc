@@ -13,6 +13,9 @@ constexpr float kLeastEdgesLeft = 3.8f, kLeastSampledEdges = 3.3f;
 /// Hats from a contact to where the coarse nodes' part is whole again. Cut off sharply it would cost more energy than
 /// the coarse matrix contains, and corrections that overshoot grow. Assumed.
 constexpr int kFadeHats = 4;
+/// Hats that overlap at a particle. A clip couples all of its hats, which their blocks leave out: with its stiffness
+/// taken once the layers in a clip tremble (deploy/docs/measurements/physics, Clips).
+constexpr float kHatsAtParticle = 4;
 
 }  // namespace
 
@@ -129,6 +132,21 @@ void CoarseSpace::ClearContacts() {
   contacts_.stiff.clear();
 }
 
+template <class Body>
+void CoarseSpace::ForHatsAt(ParticleRef particle, float scale, const Body& body) const {
+  if (particle.base < tube_floats_) return;
+  const std::size_t at = particle.base - tube_floats_, row = at / layout_.stride, place = at % layout_.stride,
+                    slot = place / kLanes, lane = place % kLanes;
+  const std::size_t group = slot / kHatSpacing, own = kLanes * group + lane;
+  const std::size_t next = group + 1 < static_cast<std::size_t>(hats_.slots) ? own + kLanes : (lane + 1) % kLanes;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const float along = scale * (i == 0 ? 1 - hats_.fraction[row] : hats_.fraction[row]);
+    const std::size_t first = (static_cast<std::size_t>(hats_.cell[row]) + i) * hats_.width;
+    body(first + own, along * hats_.own[place]);
+    body(first + next, along * hats_.next[place]);
+  }
+}
+
 void CoarseSpace::AddContact(const Element& contact) {
   struct Share {
     std::size_t hat;
@@ -149,19 +167,7 @@ void CoarseSpace::AddContact(const Element& contact) {
     shares[count++] = {hat, weight};
   };
   for (std::size_t k = 0; k < static_cast<std::size_t>(contact.count); ++k) {
-    if (contact.at[k].base < tube_floats_) {
-      continue;
-    }
-    const std::size_t at = contact.at[k].base - tube_floats_, row = at / layout_.stride, place = at % layout_.stride,
-                      slot = place / kLanes, lane = place % kLanes;
-    const std::size_t group = slot / kHatSpacing, own = kLanes * group + lane;
-    const std::size_t next = group + 1 < static_cast<std::size_t>(hats_.slots) ? own + kLanes : (lane + 1) % kLanes;
-    for (std::size_t i = 0; i < 2; ++i) {
-      const float along = contact.weight[k] * (i == 0 ? 1 - hats_.fraction[row] : hats_.fraction[row]);
-      const std::size_t first = (static_cast<std::size_t>(hats_.cell[row]) + i) * hats_.width;
-      add(first + own, along * hats_.own[place]);
-      add(first + next, along * hats_.next[place]);
-    }
+    ForHatsAt(contact.at[k], contact.weight[k], add);
   }
   // (B + v v^T)^-1 = B^-1 - (B^-1 v) (B^-1 v)^T / (1 + v . B^-1 v), by Sherman and Morrison (1950).
   std::array<FloatArray, 6>& block = blocks_.inverse;
@@ -181,6 +187,47 @@ void CoarseSpace::AddContact(const Element& contact) {
     block[3][at] = inverse(0, 1);
     block[4][at] = inverse(0, 2);
     block[5][at] = inverse(1, 2);
+  }
+}
+
+void CoarseSpace::AddClip(std::span<const ParticleRef> clipped, float stiffness) {
+  // By hat: sum of its weights at the particles, and of their squares.
+  struct Share {
+    std::size_t hat;
+    float sum, squares;
+  };
+  std::array<Share, kHatsPerClip> shares;
+  std::size_t count = 0;
+  for (const ParticleRef particle : clipped) {
+    ForHatsAt(particle, 1.0f, [&](std::size_t hat, float weight) {
+      if (!(weight > 0.0f)) return;
+      std::size_t i = 0;
+      while (i < count && shares[i].hat != hat) ++i;
+      if (i == kHatsPerClip) return;
+      if (i == count) shares[count++] = {hat, 0.0f, 0.0f};
+      shares[i].sum += weight;
+      shares[i].squares += weight * weight;
+    });
+  }
+  std::array<FloatArray, 6>& block = blocks_.inverse;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t at = shares[i].hat;
+    const float added = kHatsAtParticle * stiffness *
+                        (shares[i].squares - shares[i].sum * shares[i].sum / static_cast<float>(clipped.size()));
+    Eigen::Matrix3f inverse;
+    inverse << block[0][at], block[3][at], block[4][at], block[3][at], block[1][at], block[5][at], block[4][at],
+        block[5][at], block[2][at];
+    if (!(inverse.trace() > 0.0f) || !(added > 0.0f)) continue;
+    // (B + s I)^-1 = (I + s B^-1)^-1 B^-1. The rotation, which the clip also leaves free, is not taken off s.
+    const Eigen::Matrix3f softened = (Eigen::Matrix3f::Identity() + added * inverse).inverse() * inverse;
+    contacts_.stiff.push_back({at, 0.0f});
+    contacts_.coarse_weight[at] *= softened.trace() / inverse.trace();
+    block[0][at] = softened(0, 0);
+    block[1][at] = softened(1, 1);
+    block[2][at] = softened(2, 2);
+    block[3][at] = 0.5f * (softened(0, 1) + softened(1, 0));
+    block[4][at] = 0.5f * (softened(0, 2) + softened(2, 0));
+    block[5][at] = 0.5f * (softened(1, 2) + softened(2, 1));
   }
 }
 

@@ -68,7 +68,9 @@ class CoarseSpace {
   /// Adds the stiffness of a contact to the blocks of the hats that move it, for this substep: without it they would
   /// move it as easily as the sheet.
   void AddContact(const Element& contact);
-  /// After the last contact: lets the coarse nodes' part fade out around the contacts.
+  /// The same of a clip on these particles: the stiffness of its rigid frame against translations that differ.
+  void AddClip(std::span<const ParticleRef> clipped, float stiffness);
+  /// After the last contact and clip: lets the coarse nodes' part fade out around the contacts.
   void FadeAtContacts();
 
   /// From the residual of what is computed - `row_sums` [rows][row_width()] by SheetKernels::restrict_rows, tube xyz_ -
@@ -81,6 +83,8 @@ class CoarseSpace {
  private:
   /// Particles of a contact times hats around a particle.
   static constexpr std::size_t kHatsPerContact = 16;
+  /// Hats around the particles of a clip.
+  static constexpr std::size_t kHatsPerClip = 64;
   /// Nodes around a cell of the lattice.
   static constexpr std::size_t kCellCorners = 8;
   /// Where the hats are. Built once.
@@ -174,6 +178,9 @@ class CoarseSpace {
   void AddSlide(const Element& slide, float turned);
   void AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int row);
   [[nodiscard]] std::array<std::uint32_t, 2> HatsOf(std::uint32_t col) const;
+  /// body(hat, scale * its weight there), for the hats at a node of the membrane.
+  template <class Body>
+  void ForHatsAt(ParticleRef particle, float scale, const Body& body) const;
   [[nodiscard]] float HatAt(std::uint32_t hat, int row, int col) const;
   void RestrictTube(int first, int end, const float* tube_residual, const float* tube);
   void SumRows(std::span<const Task> tasks, const float* row_sums);

@@ -285,6 +285,7 @@ void Elements::LineariseBindings(const float* place) {
 void Elements::AddContactForces(float* residual) const {
   guard_.AddForce(residual);
   slides_.AddForce(residual);
+  if (has_clips()) clips_->AddForce(residual);
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     Spread(contacts_[i], contact_force_[i], residual);
   }
@@ -305,12 +306,14 @@ double Elements::MultiplyBindingsAndContacts(const float* p, const Selection& se
     sum += static_cast<double>(d.dot(force));
     contact_product_.push_back(force);
   }
-  return sum + slides_.Multiply(p);
+  sum += slides_.Multiply(p);
+  return has_clips() ? sum + clips_->Multiply(p) : sum;
 }
 
 double Elements::AddContactProduct(const float* p, float scale, float* out) {
   const double sum = guard_.Apply(p, scale, out);
   slides_.AddProduct(scale, out);
+  if (has_clips()) clips_->AddProduct(scale, out);
   const std::span<const Element> contacts = contacts_in_product();
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     Spread(contacts[i], scale * contact_product_[i], out);
@@ -338,6 +341,7 @@ void Elements::Add(const Selection& selection, float* field) const {
 
 double Elements::EnergyOfBindingsAndContacts(const float* place, std::span<const ContactRow> contacts) const {
   double sum = guard_.Energy(place) + slides_.Energy(place);
+  if (has_clips()) sum += clips_->Energy(place);
   for (const std::uint32_t i : computed_.bindings) {
     const __m128 d = _mm_sub_ps(CombineBinding(bindings_[i], place), _mm_load_ps(binding_rest_[i].offset.data()));
     const float stretch = std::sqrt(_mm_cvtss_f32(Dot3(d, d))) - binding_rest_[i].length;

@@ -17,6 +17,7 @@
 #include <span>
 #include <vector>
 
+#include "physics_node/clips/clips.h"
 #include "physics_node/collision/contact_row.h"
 #include "physics_node/energy/elastic_model.h"
 #include "physics_node/implicit/element.h"
@@ -73,6 +74,14 @@ class Elements {
   void FindSlides(const float* place, const Regions& regions) { slides_.Linearise(place, regions); }
   [[nodiscard]] const Slides& slides() const { return slides_; }
   void RestartSlides() { slides_.Restart(); }
+  /// Clips on the tissue, which another keeps and outlives this; until then none.
+  void UseClips(Clips* clips) { clips_ = clips; }
+  [[nodiscard]] bool has_clips() const { return clips_ != nullptr && !clips_->empty(); }
+  [[nodiscard]] const Clips& clips() const { return *clips_; }
+  /// Fits them; independent of all others.
+  void FitClips(const float* place, const Regions& regions) {
+    clips_->Linearise(place, [&](ParticleRef at) { return regions.computed(regions.partition().Of(at)); });
+  }
   /// A contact with a tool, not of tissue with tissue.
   [[nodiscard]] static bool IsStiff(const Element& contact) { return contact.m.squaredNorm() > kStiffContact_N_per_m; }
 
@@ -83,7 +92,7 @@ class Elements {
   /// Linearises at `place`, for AddInRegion.
   void LineariseHinges(const float* place) { hinges_.MakeForce(place, computed_.hinge_rows); }
   void LineariseBindings(const float* place);
-  /// residual += forces of the guard, the slides and the contacts.
+  /// residual += forces of the guard, the slides, the clips and the contacts.
   void AddContactForces(float* residual) const;
   /// While set, contacts take no part in products.
   void ExcludeContacts(bool exclude) { contacts_excluded_ = exclude; }
@@ -93,7 +102,7 @@ class Elements {
     return hinges_.Multiply(p, selection.hinge_rows);
   }
   double MultiplyBindingsAndContacts(const float* p, const Selection& selection);
-  /// out += scale * the part of contacts and slides in the last product. The guard, which is mostly empty, is
+  /// out += scale * the part of contacts, slides and clips in the last product. The guard, which is mostly empty, is
   /// multiplied here; returns its share of p . K p.
   double AddContactProduct(const float* p, float scale, float* out);
   /// field += the last force, or the last product of all that is computed, of bindings and hinges in a region that is
@@ -103,7 +112,7 @@ class Elements {
   void Add(const Selection& selection, float* field) const;
 
   [[nodiscard]] double EnergyOfHinges(const float* place) { return hinges_.Energy(place, computed_.hinge_rows); }
-  /// Of bindings, contacts, slides and guarded tetrahedra [J].
+  /// Of bindings, contacts, slides, clips and guarded tetrahedra [J].
   [[nodiscard]] double EnergyOfBindingsAndContacts(const float* place, std::span<const ContactRow> contacts) const;
 
   /// Normal and friction forces of contacts with tools at `place` + `d`, sliding measured from `start`, h ago.
@@ -148,6 +157,7 @@ class Elements {
   HingeMatrix hinges_;
   InversionGuard guard_;
   Slides slides_;
+  Clips* clips_ = nullptr;
 };
 
 }  // namespace fulcrum::physics::implicit

@@ -99,6 +99,16 @@ void WakeSliding(const Slides& slides, Regions* regions) {
   }
 }
 
+/// Tissue in a clip of which a part moves stays awake.
+void WakeClipped(const Clips& clips, Regions* regions) {
+  const Partition& partition = regions->partition();
+  clips.ForEach([&](std::span<const ParticleRef> clipped) {
+    if (std::ranges::any_of(clipped, [&](ParticleRef at) { return regions->moving(partition.Of(at)); })) {
+      for (const ParticleRef at : clipped) regions->Wake(partition.Of(at));
+    }
+  });
+}
+
 /// After a change of the computed regions: elements, levels and blocks follow. What is no longer computed does not move
 /// and is no direction of the solve.
 void FollowComputedRegions(const SolverContext& context, SolverState* state, KrylovVectors* krylov) {
@@ -237,6 +247,7 @@ SubstepReport ImplicitSolver::Substep(float h, int iterations, std::span<const H
   state_.elements.guard().ForVerticesFound(
       [this](Index v) { state_.regions.Wake(model_.partition.At(false, static_cast<int>(v))); });
   WakeSliding(state_.elements.slides(), &state_.regions);
+  if (state_.elements.has_clips()) WakeClipped(state_.elements.clips(), &state_.regions);
   if (state_.regions.Rebuild()) {
     FollowComputedRegions(context_, &state_, &scratch_.krylov);
   }

@@ -47,6 +47,9 @@ class ImplicitSolver {
   /// cost grows with the edits; nothing is factored again.
   void UpdateTopology(const TissueModel& tissue);
 
+  /// Clips act from now on; they must outlive this.
+  void UseClips(Clips* clips) { state_.elements.UseClips(clips); }
+
   /// Once a step, before its substeps: stores the positions. A position damaged since the last step (not finite, far
   /// off) comes from the last step; returns how many coordinates.
   std::uint32_t BeginStep();

@@ -102,7 +102,7 @@ void PredictConstrained(const SolverContext& context, const BoundaryConditions& 
 
 // Linearisation.
 
-/// Contacts, slides, folds and frayed edges stiffen the diagonal of what they touch.
+/// Contacts, slides, clips, folds and frayed edges stiffen the diagonal of what they touch.
 void UpdateElementDiagonal(const ImplicitModel& model, SolverState* state) {
   Linearisation& at = state->linearisation;
   for (const std::size_t i : at.raised) {
@@ -126,6 +126,12 @@ void UpdateElementDiagonal(const ImplicitModel& model, SolverState* state) {
   };
   for (const Element& contact : state->elements.contacts()) raise_all(contact, Elements::IsStiff(contact));
   for (const Element& slide : state->elements.slides().elements()) raise_all(slide, false);
+  if (state->elements.has_clips()) {
+    // K of a clip is not above k I.
+    state->elements.clips().ForEach([&](std::span<const ParticleRef> clipped) {
+      for (const ParticleRef of : clipped) raise(model.layout.ScalarIndex(of), Clips::kStiffness_N_per_m);
+    });
+  }
   for (const FrayedEdge& edge : state->edges.frayed_edges()) {
     for (const std::uint32_t i : edge.at) {
       raise(i, edge.stiffness);
@@ -215,6 +221,10 @@ void AddContactsToLevels(const Elements& elements, CoarseSpace* coarse) {
     if (Elements::IsStiff(contact)) {
       coarse->AddContact(contact);
     }
+  }
+  if (elements.has_clips()) {
+    elements.clips().ForEach(
+        [&](std::span<const ParticleRef> clipped) { coarse->AddClip(clipped, Clips::kStiffness_N_per_m); });
   }
   coarse->FadeAtContacts();
 }
@@ -307,13 +317,15 @@ std::uint32_t Predict(const SolverContext& context, const Inertia& inertia, cons
 void Linearise(const SolverContext& context, const Inertia& inertia, std::span<const ContactRow> contacts,
                SolverState* state, SolverScratch* scratch) {
   Linearisation& at = state->linearisation;
-  context.workers.Run(state->elements.slides().empty() ? 2 : 3, 0, [&](int task, int) {
+  const bool slides = !state->elements.slides().empty(), clips = state->elements.has_clips();
+  context.workers.Run(slides || clips ? 3 : 2, 0, [&](int task, int) {
     if (task == 0) {
       state->elements.FindContacts(inertia.h, at.point.data(), context.particles.pool(), state->regions, contacts);
     } else if (task == 1) {
       state->elements.FindInversions(at.point.data(), state->regions);
     } else {
       state->elements.FindSlides(at.point.data(), state->regions);
+      if (clips) state->elements.FitClips(at.point.data(), state->regions);
     }
   });
   UpdateElementDiagonal(context.model, state);

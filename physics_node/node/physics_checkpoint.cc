@@ -20,6 +20,19 @@ struct HeldRecord {
   std::uint32_t particle;
   float p_T[3];
 };
+struct ClipRecord {
+  float p_AC[3];
+  float q_AC[4];  ///< w x y z.
+  float q_WC[4];
+  float length_m;
+  std::uint32_t anchors[3];
+  std::uint32_t tool;
+  std::uint32_t particle_count;
+};
+struct ClippedRecord {
+  std::uint32_t particle;
+  float p_C[3];
+};
 struct Header {
   std::uint64_t periods;
   std::uint32_t particle_count;
@@ -28,9 +41,11 @@ struct Header {
   std::uint32_t torn_bytes;       ///< 0: nothing has torn.
   std::uint32_t further_periods;  ///< Of the last step, beyond one.
   ToolRecord tools[kMaxTools];
+  std::uint32_t clip_count, clips_lost, clips_refused;
+  std::uint32_t clipped_count;  ///< Particles of all clips.
 };
 // Followed by positions, previous positions (3 floats a particle each), then the held particles tool by tool,
-// then the bits of the torn edges.
+// then the bits of the torn edges, then the clips, each followed by its particles.
 
 // Bounds of plausible values, beyond those of any session.
 constexpr float kMostCoordinate_m = 10;
@@ -48,6 +63,65 @@ bool IsPlausible(const ToolRecord& tool) {
                               within(norm - 1, kUnitTolerance) && within(tool.jaw_rad, kMostJaw_rad)));
 }
 
+std::byte* Append(const auto& record, std::byte* at) {
+  std::memcpy(at, &record, sizeof(record));
+  return at + sizeof(record);
+}
+const std::byte* Take(const std::byte* at, auto* record) {
+  std::memcpy(record, at, sizeof(*record));
+  return at + sizeof(*record);
+}
+
+void Put(const Quatf& q, float* wxyz) {
+  wxyz[0] = q.w();
+  std::copy_n(q.vec().data(), 3, wxyz + 1);
+}
+Quatf QuaternionOf(const float* wxyz) { return {wxyz[0], wxyz[1], wxyz[2], wxyz[3]}; }
+
+std::byte* WriteClips(const ClipMemory& memory, std::byte* at) {
+  for (const AppliedClip& clip : memory.clips) {
+    ClipRecord record{};
+    std::copy_n(clip.placed.p_AC.data(), 3, record.p_AC);
+    Put(clip.placed.q_AC, record.q_AC);
+    Put(clip.q_WC, record.q_WC);
+    record.length_m = clip.placed.length_m;
+    std::copy(clip.placed.anchors.begin(), clip.placed.anchors.end(), record.anchors);
+    record.tool = clip.placed.tool;
+    record.particle_count = static_cast<std::uint32_t>(clip.tissue.size());
+    at = Append(record, at);
+    for (const ClippedParticle& clipped : clip.tissue) {
+      at = Append(ClippedRecord{clipped.particle, {clipped.p_C.x(), clipped.p_C.y(), clipped.p_C.z()}}, at);
+    }
+  }
+  return at;
+}
+
+/// False: the particles of the clips are not as many as the header says. The bytes are as long as it says.
+bool ReadClips(const Header& header, const std::byte* at, ClipMemory* memory) {
+  memory->lost = header.clips_lost;
+  memory->refused = header.clips_refused;
+  std::uint32_t left = header.clipped_count;
+  for (std::uint32_t i = 0; i < header.clip_count; ++i) {
+    ClipRecord record;
+    at = Take(at, &record);
+    if (record.particle_count > left || record.tool >= kMaxTools) return false;
+    left -= record.particle_count;
+    AppliedClip& clip = memory->clips.emplace_back();
+    clip.placed.p_AC = Vec3f(record.p_AC[0], record.p_AC[1], record.p_AC[2]);
+    clip.placed.q_AC = QuaternionOf(record.q_AC);
+    clip.q_WC = QuaternionOf(record.q_WC);
+    clip.placed.length_m = record.length_m;
+    std::copy_n(record.anchors, 3, clip.placed.anchors.begin());
+    clip.placed.tool = static_cast<std::uint8_t>(record.tool);
+    for (std::uint32_t k = 0; k < record.particle_count; ++k) {
+      ClippedRecord clipped;
+      at = Take(at, &clipped);
+      clip.tissue.push_back({clipped.particle, Vec3f(clipped.p_C[0], clipped.p_C[1], clipped.p_C[2])});
+    }
+  }
+  return left == 0;
+}
+
 std::size_t PositionsBytes(Index particles) { return 3 * sizeof(float) * std::size_t{particles}; }
 
 }  // namespace
@@ -55,7 +129,8 @@ std::size_t PositionsBytes(Index particles) { return 3 * sizeof(float) * std::si
 std::size_t CheckpointCapacity(Index particle_count) {
   // At most three edges per particle.
   return sizeof(Header) + 2 * PositionsBytes(particle_count) + (3 * std::size_t{particle_count} + 7) / 8 +
-         kMaxTools * sizeof(HeldRecord) * std::size_t{particle_count};
+         kMaxTools * sizeof(HeldRecord) * std::size_t{particle_count} +
+         kMaxClips * (sizeof(ClipRecord) + kMostClipped * sizeof(ClippedRecord));
 }
 
 std::size_t WriteCheckpoint(const TissueSimulation& simulation, const NodeMemory& node, std::span<std::byte> slot) {
@@ -88,6 +163,13 @@ std::size_t WriteCheckpoint(const TissueSimulation& simulation, const NodeMemory
   header.torn_bytes = static_cast<std::uint32_t>(memory.torn_edges.size());
   std::copy(memory.torn_edges.begin(), memory.torn_edges.end(), reinterpret_cast<std::uint8_t*>(at));
   at += memory.torn_edges.size();
+  header.clip_count = static_cast<std::uint32_t>(memory.clips.clips.size());
+  header.clips_lost = memory.clips.lost;
+  header.clips_refused = memory.clips.refused;
+  for (const AppliedClip& clip : memory.clips.clips) {
+    header.clipped_count += static_cast<std::uint32_t>(clip.tissue.size());
+  }
+  at = WriteClips(memory.clips, at);
   std::memcpy(slot.data(), &header, sizeof(header));
   auto* floats = reinterpret_cast<float*>(slot.data() + sizeof(Header));
   particles.CopyPositions({floats, 3 * std::size_t{count}});
@@ -115,6 +197,8 @@ std::optional<NodeMemory> ReadCheckpoint(std::span<const std::byte> payload, Tis
     size += sizeof(HeldRecord) * std::size_t{tool.held_count};
   }
   size += header.torn_bytes;
+  size +=
+      sizeof(ClipRecord) * std::size_t{header.clip_count} + sizeof(ClippedRecord) * std::size_t{header.clipped_count};
   if (payload.size() != size || header.particle_count != simulation->particles().particle_count() ||
       header.further_periods >= TissueSimulation::kMostStepPeriods || header.periods > kMostPeriods ||
       !(header.max_displacement_m >= 0 && header.max_displacement_m <= kMostCoordinate_m) ||
@@ -145,6 +229,9 @@ std::optional<NodeMemory> ReadCheckpoint(std::span<const std::byte> payload, Tis
   }
   const auto* torn = reinterpret_cast<const std::uint8_t*>(at);
   memory.torn_edges.assign(torn, torn + header.torn_bytes);
+  if (!ReadClips(header, at + header.torn_bytes, &memory.clips)) {
+    return std::nullopt;
+  }
   if (!simulation->Restore(xyz, previous, memory)) {
     return std::nullopt;
   }

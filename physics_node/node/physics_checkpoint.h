@@ -1,5 +1,5 @@
-// Checkpoint of a physics node as bytes: positions now and one step before, tools and grasps, torn edges. The topology
-// is not part of it: it comes from TopologyState.
+// Checkpoint of a physics node as bytes: positions now and one step before, tools and grasps, torn edges,
+// clips. The topology is not part of it: it comes from TopologyState.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@
 namespace fulcrum::physics {
 
 /// Increased with any change of the layout.
-inline constexpr std::uint32_t kCheckpointLayout = 3;
+inline constexpr std::uint32_t kCheckpointLayout = 4;
 
 [[nodiscard]] std::size_t CheckpointCapacity(Index particle_count);
 

@@ -46,6 +46,7 @@ PhysicsNode::PhysicsNode(const SceneView& scene, const Ports& ports, runtime::Ch
       simulation_(scene, threads),
       hook_(static_cast<std::uint32_t>(FindTool(scene.tools, ToolKind::kHook).value_or(kMaxTools))),
       stampers_(epoch_ns) {
+  clip_revisions_.saved = simulation_.clips().revision();
   for (ToolInput& input : inputs_) {
     // Until the first HandleState, between the angles for closing and opening: jaws neither grasp nor release.
     input.pose.jaw_rad = 0.5f * (scene.physics.grasp_close_rad + scene.physics.grasp_open_rad);
@@ -67,6 +68,7 @@ bool PhysicsNode::Restore(std::span<const std::byte> checkpoint) {
   time_.contact_s = state->contact_time_s;
   restart_.catch_up_steps = std::max(1, static_cast<int>(std::lround(kCatchUp_s / scene_.physics.dt_s)));
   tear_counts_.saved = simulation_.tears().torn_count();
+  clip_revisions_.saved = simulation_.clips().revision();
   const SimulationMemory memory = simulation_.Save();
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     if (memory.known[i]) {
@@ -235,6 +237,7 @@ void PhysicsNode::Step(const Tick& tick) {
   PublishManifest(tick);
   SaveCheckpoint();
   PublishTears(tick);
+  PublishClips(tick);
   ++ticks_.count;
 }
 
@@ -357,6 +360,10 @@ void PhysicsNode::Measure() {
   figures_.quarantined.store(simulation_.quarantined(), std::memory_order_relaxed);
   figures_.grasped.store(simulation_.held_particles(), std::memory_order_relaxed);
   figures_.torn_edges.store(simulation_.tears().torn_count(), std::memory_order_relaxed);
+  const Clips& clips = simulation_.clips();
+  figures_.clips.store(static_cast<std::uint32_t>(clips.count()), std::memory_order_relaxed);
+  figures_.clips_lost.store(clips.lost(), std::memory_order_relaxed);
+  figures_.clips_refused.store(clips.refused(), std::memory_order_relaxed);
   figures_.nearest_to_tearing.store(simulation_.tears().nearest(), std::memory_order_relaxed);
   figures_.largest_stretch.store(simulation_.tears().largest_stretch_ever(), std::memory_order_relaxed);
   std::uint32_t limited = 0;
@@ -382,12 +389,14 @@ void PhysicsNode::Measure() {
 
 void PhysicsNode::SaveCheckpoint() {
   const std::uint32_t torn = simulation_.tears().torn_count();
-  const bool due =
-      torn != tear_counts_.saved || (ticks_.count % kSlowTicks == 0 && versions_.saved != simulation_.state_version());
+  const std::uint64_t clips = simulation_.clips().revision();
+  const bool due = torn != tear_counts_.saved || clips != clip_revisions_.saved ||
+                   (ticks_.count % kSlowTicks == 0 && versions_.saved != simulation_.state_version());
   if (checkpoint_ == nullptr || !due) {
     return;
   }
   tear_counts_.saved = torn;
+  clip_revisions_.saved = clips;
   versions_.saved = simulation_.state_version();
   checkpoint_->Commit(WriteCheckpoint(simulation_, {max_displacement_m_, time_.contact_s}, checkpoint_->Begin()));
 }
@@ -409,6 +418,22 @@ void PhysicsNode::PublishTears(const Tick& tick) {
   }
 }
 
+/// After the checkpoint, as tears. The first tick publishes as well: readers drop what another process has left.
+void PhysicsNode::PublishClips(const Tick& tick) {
+  const Clips& clips = simulation_.clips();
+  if (!clips.possible() || clips.revision() == clip_revisions_.published) {
+    return;
+  }
+  ClipState state;
+  state.stamp = stampers_.clip.Next(tick.stamp_ns);
+  state.scene_hash = scene_.hash;
+  clips.Fill(&state);
+  // Repeated in the next tick if it was not sent.
+  if (ports_.clips.Write(state)) {
+    clip_revisions_.published = clips.revision();
+  }
+}
+
 void PhysicsNode::FillHealth(Health* health) const {
   const auto add = [health](const std::string& name, double value) { health->metrics.push_back({name, value}); };
   // One warning must not hide another.
@@ -427,6 +452,11 @@ void PhysicsNode::FillHealth(Health* health) const {
   add("asleep_ticks", static_cast<double>(figures_.asleep_ticks.load(std::memory_order_relaxed)));
   add("topology_edits", static_cast<double>(figures_.topology_edits.load(std::memory_order_relaxed)));
   add("torn_edges", figures_.torn_edges.load(std::memory_order_relaxed));
+  if (simulation_.clips().possible()) {
+    add("clips", figures_.clips.load(std::memory_order_relaxed));
+    add("clips_lost", figures_.clips_lost.load(std::memory_order_relaxed));
+    add("clips_refused", figures_.clips_refused.load(std::memory_order_relaxed));
+  }
   add("largest_stretch", figures_.largest_stretch.load(std::memory_order_relaxed));
   // The gravest first: Health has room for 255 characters.
   if (const std::uint64_t refused = figures_.topology_refused.load(std::memory_order_relaxed); refused > 0) {

@@ -32,6 +32,7 @@ class PhysicsNode {
     bus::Output<CauteryContact>& cautery;
     bus::Output<TearState>& tears;
     bus::Output<TickManifest>& manifests;
+    bus::Output<ClipState>& clips;
   };
 
   /// Scene, ports and checkpoint must outlive the node. Continues from the checkpoint if it has a state.
@@ -87,6 +88,7 @@ class PhysicsNode {
   void PublishCautery(const Tick& tick);
   void PublishManifest(const Tick& tick);
   void PublishTears(const Tick& tick);
+  void PublishClips(const Tick& tick);
   void SaveCheckpoint();
   void Measure();
 
@@ -98,8 +100,8 @@ class PhysicsNode {
 
   struct Stampers {
     explicit Stampers(std::int64_t epoch_ns)
-        : frame(epoch_ns), contact(epoch_ns), cautery(epoch_ns), tear(epoch_ns), manifest(epoch_ns) {}
-    bus::Stamper frame, contact, cautery, tear, manifest;
+        : frame(epoch_ns), contact(epoch_ns), cautery(epoch_ns), tear(epoch_ns), manifest(epoch_ns), clip(epoch_ns) {}
+    bus::Stamper frame, contact, cautery, tear, manifest, clip;
   };
   Stampers stampers_;
 
@@ -159,6 +161,11 @@ class PhysicsNode {
     std::uint32_t published = 0, saved = 0;
   };
   TearCounts tear_counts_;
+  /// Clips::revision() in the last ClipState and checkpoint; 0: none.
+  struct ClipRevisions {
+    std::uint64_t published = 0, saved = 0;
+  };
+  ClipRevisions clip_revisions_;
   std::array<std::uint64_t, kMaxTools> limited_until_{};  ///< Tick until which Health warns of a limited force.
 
   /// For the health thread. Relaxed order: the figures are independent of each other.
@@ -169,6 +176,7 @@ class PhysicsNode {
     std::atomic<std::uint32_t> grasped{0};
     std::atomic<std::uint64_t> quarantined{0}, asleep_ticks{0}, topology_refused{0}, topology_edits{0};
     std::atomic<std::uint32_t> torn_edges{0};
+    std::atomic<std::uint32_t> clips{0}, clips_lost{0}, clips_refused{0};
     std::atomic<std::uint32_t> limited{0};  ///< Bit per tool: the force on it was limited.
     std::atomic<TearWatch::Nearest> nearest_to_tearing{};
     static_assert(decltype(nearest_to_tearing)::is_always_lock_free);

@@ -40,6 +40,7 @@ TissueSimulation::TissueSimulation(const TissueScene& scene, int threads, Instru
       tissue_collision_(scene, &model_, &particles_, collision::KernelsFor(set)),
       sheet_collision_(scene, &model_, &particles_),
       grasps_{Grasp(scene), Grasp(scene), Grasp(scene), Grasp(scene)},
+      clips_(scene),
       contacts_(scene, &model_, &particles_),
       cautery_(scene, &model_, &particles_),
       tears_(scene, &model_, &particles_) {
@@ -55,6 +56,7 @@ TissueSimulation::TissueSimulation(const TissueScene& scene, int threads, Instru
       xpbd_.emplace(elastic, &model_, &particles_, xpbd::KernelsFor(set), tissue::KernelsFor(set));
     } else {
       implicit_.emplace(scene, elastic, model_, &particles_, threads, implicit::KernelsFor(set));
+      implicit_->UseClips(&clips_);
       effort_ = implicit::EffortOf(scene.physics.preset);
       // Without gravity a scene begins in equilibrium: its bodies need not be computed until something moves them.
       if (scene.physics.gravity.isZero(0.0f)) implicit_->Stop();
@@ -93,6 +95,7 @@ StepReport TissueSimulation::StepPaper() {
   for (std::uint32_t iteration = 0; iteration < solver_.iterations(); ++iteration) {
     printed_ ? printed_->Iterate() : solver_.Iterate();
     collision_.Project();
+    clips_.Project(&particles_);
   }
   const FinishResult finish = solver_.Finish();
   collision_.Settle();
@@ -161,6 +164,7 @@ StepReport TissueSimulation::StepXpbd(std::uint32_t last_periods) {
     }
     xpbd_->Iterate(h);
     ProjectRows(rows_, ToolCollision::kMaxPush, h, &particles_);
+    clips_.Project(&particles_);
     const FinishResult finish = xpbd_->Finish(h);
     collision_.TakeForces(rows_);
     report.resets += finish.resets;
@@ -319,6 +323,7 @@ int TissueSimulation::ApplyTopology(const TopologyState& topology) {
     for (Grasp& grasp : grasps_) {
       grasp.DropDead(model_, &particles_);
     }
+    clips_.DropDead(model_, particles_);
     tears_.Follow();
     sleep_.asleep = false;
     sleep_.still_steps = 0;
@@ -416,6 +421,7 @@ std::uint64_t TissueSimulation::StateHash() const {
   if (tears_.torn_count() > 0) {
     hash.Add(tears_.torn());
   }
+  clips_.AddTo(&hash);
   return hash.value();
 }
 
@@ -432,6 +438,7 @@ SimulationMemory TissueSimulation::Save() const {
   if (tears_.torn_count() > 0) {
     memory.torn_edges.assign(tears_.torn().begin(), tears_.torn().end());
   }
+  memory.clips = clips_.Save();
   return memory;
 }
 
@@ -449,7 +456,8 @@ bool TissueSimulation::Restore(std::span<const float> xyz, std::span<const float
                   [&](float now, float before) { return near(now, before, kMostTravel_m); })) {
     return false;
   }
-  if (!memory.torn_edges.empty() && !tears_.Fits(memory.torn_edges)) {
+  if ((!memory.torn_edges.empty() && !tears_.Fits(memory.torn_edges)) ||
+      !clips_.Fits(memory.clips, particles_.particle_count())) {
     return false;
   }
   for (const auto& held : memory.held) {
@@ -472,6 +480,7 @@ bool TissueSimulation::Restore(std::span<const float> xyz, std::span<const float
     tracks_[i] = {memory.known[i], memory.pose[i], memory.pose[i]};
     grasps_[i].Restore(memory.grasp_state[i], memory.held[i], &particles_);
   }
+  clips_.Restore(memory.clips, particles_);
   tears_.Restore(memory.torn_edges);
   collision_.Restart();
   sheet_collision_.Restart();

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "physics_node/clips/clips.h"
 #include "physics_node/collision/sheet_collision.h"
 #include "physics_node/collision/tissue_collision.h"
 #include "physics_node/collision/tool_collision.h"
@@ -50,6 +51,7 @@ struct SimulationMemory {
   std::array<Grasp::State, kMaxTools> grasp_state{};
   std::array<std::vector<HeldParticle>, kMaxTools> held;
   std::vector<std::uint8_t> torn_edges;  ///< Bits as in TearState; empty: none.
+  ClipMemory clips;
 };
 
 class TissueSimulation {
@@ -95,6 +97,8 @@ class TissueSimulation {
   /// without forces.
   [[nodiscard]] std::span<const ContactRow> rows() const { return rows_; }
   [[nodiscard]] const Grasp& grasp(std::uint32_t tool) const { return grasps_[tool]; }
+  /// That clip appliers have left on the tissue.
+  [[nodiscard]] const Clips& clips() const { return clips_; }
   /// Of all tools.
   [[nodiscard]] std::uint32_t held_particles() const {
     std::size_t count = 0;
@@ -124,7 +128,7 @@ class TissueSimulation {
 
   /// Largest distance of a particle of live, connected tissue from rest [m].
   [[nodiscard]] float MaxDisplacement() const;
-  /// Hash of particles, topology revision and tears: equal for equal runs.
+  /// Hash of particles, topology revision, tears and clips: equal for equal runs.
   [[nodiscard]] std::uint64_t StateHash() const;
 
   [[nodiscard]] SimulationMemory Save() const;
@@ -173,6 +177,7 @@ class TissueSimulation {
   void PlaceHeld(float u);
   void FindAllContacts(float h);
   void UpdateGrasps();
+  void ApplyClip(std::size_t tool);
   void WatchTears(float max_step_m);
   [[nodiscard]] double step_begin_s() const { return simulated_time_s() - static_cast<double>(step_s()); }
   void FindTissueContacts();
@@ -195,6 +200,7 @@ class TissueSimulation {
   TissueCollision tissue_collision_;
   SheetCollision sheet_collision_;
   std::array<Grasp, kMaxTools> grasps_;
+  Clips clips_;
   ContactProbe contacts_;
   ImplicitCompliance implicit_compliance_{this};
   CauteryProbe cautery_;

@@ -61,11 +61,19 @@ void TissueSimulation::UpdateGrasps() {
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     const ToolTrack& track = tracks_[i];
     if (track.present) {
+      const bool held = grasps_[i].holding();
       grasps_[i].Update(scene_.tools[i], track.now, model_, &particles_);
+      if (scene_.tools[i].kind == ToolKind::kClipApplier && !held && grasps_[i].holding()) ApplyClip(i);
     } else if (grasps_[i].holding()) {
       grasps_[i].Release(model_, &particles_);
     }
   }
+}
+
+void TissueSimulation::ApplyClip(std::size_t tool) {
+  std::vector<Index> held;
+  for (const HeldParticle& particle : grasps_[tool].held()) held.push_back(particle.particle);
+  (void)clips_.Apply(static_cast<std::uint8_t>(tool), scene_.tools[tool], tracks_[tool].now, held, particles_);
 }
 
 void TissueSimulation::FindContacts(bool tissue_moved, float tissue_step) {
@@ -73,7 +81,8 @@ void TissueSimulation::FindContacts(bool tissue_moved, float tissue_step) {
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     if (tracks_[i].present) {
       // The handle of a suction tube is a valve.
-      const bool has_jaws = scene_.tools[i].kind == ToolKind::kGrasper || scene_.tools[i].kind == ToolKind::kScissors;
+      const ToolKind kind = scene_.tools[i].kind;
+      const bool has_jaws = kind == ToolKind::kGrasper || kind == ToolKind::kScissors || kind == ToolKind::kClipApplier;
       motions[i] = {ShapeOf(scene_.tools[i], tracks_[i].last), ShapeOf(scene_.tools[i], tracks_[i].now),
                     grasps_[i].holding(), has_jaws && tracks_[i].now.jaw_rad < tracks_[i].last.jaw_rad};
     }

@@ -94,6 +94,7 @@ class ReplayedPhysics final : public ReplayedNode {
     contacts_.TakeInto(&published);
     cautery_.TakeInto(&published);
     tears_.TakeInto(&published);
+    clips_.TakeInto(&published);
     return published;
   }
   void FillHealth(Health* health) const override { node_->FillHealth(health); }
@@ -110,7 +111,7 @@ class ReplayedPhysics final : public ReplayedNode {
     open_cells_ = {};
     node_.emplace(scene_,
                   physics::PhysicsNode::Ports{*tools_.in, *handles_.in, *topology_.in, *open_cells_.in, *frames_,
-                                              *contacts_.out, *cautery_.out, *tears_.out, *manifests_.out},
+                                              *contacts_.out, *cautery_.out, *tears_.out, *manifests_.out, *clips_.out},
                   checkpoint_.file(), epoch_ns, threads_);
   }
 
@@ -119,6 +120,7 @@ class ReplayedPhysics final : public ReplayedNode {
     contacts_.Drop();
     cautery_.Drop();
     tears_.Drop();
+    clips_.Drop();
     tools_.Give(tick.tools);
     handles_.Give(tick.handles);
     topology_.Give(tick.topology);
@@ -144,6 +146,7 @@ class ReplayedPhysics final : public ReplayedNode {
   Outlet<CauteryContact> cautery_;
   Outlet<TearState> tears_;
   Outlet<TickManifest> manifests_;
+  Outlet<ClipState> clips_;
   std::optional<physics::PhysicsNode> node_;
 };
 

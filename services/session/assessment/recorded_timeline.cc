@@ -37,7 +37,8 @@ RecordedTimeline ReadTimeline(const std::filesystem::path& file, const std::stop
   const std::filesystem::path beside = recording::BesideRecording("", file, "scene.fulcrum");
   const std::optional<scene::SceneFile> scene = beside.empty() ? std::nullopt : std::optional<scene::SceneFile>(beside);
   Timeline timeline(StartOf(file), scene ? &scene->view() : nullptr);
-  log_tools::Recording recording(file, {.topics = {"ToolState", "ContactModel", "HandleState", "ThermalEvent"}});
+  log_tools::Recording recording(file,
+                                 {.topics = {"ToolState", "ContactModel", "HandleState", "ThermalEvent", "ClipState"}});
   std::map<TopicId, bus::InputAccount> accounts;  // Skips the samples of a process that has been replaced.
   log_tools::Entry entry;
   while (!stop.stop_requested() && recording.Next(&entry)) {

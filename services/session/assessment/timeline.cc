@@ -86,6 +86,8 @@ std::string TextOf(const Happening& happening) {
       return "Force too high";
     case HappeningKind::kSlip:
       return tool + " loses its hold";
+    case HappeningKind::kClip:
+      return "Clip applied (tool " + std::to_string(happening.tool + 1) + ")";
     case HappeningKind::kThermal:
       return NamesOf(happening.thermal).text;
   }
@@ -110,6 +112,8 @@ const char* KeyOf(const Happening& happening) {
       return "force";
     case HappeningKind::kSlip:
       return "slip";
+    case HappeningKind::kClip:
+      return "clip";
     case HappeningKind::kThermal:
       return NamesOf(happening.thermal).key;
   }
@@ -204,6 +208,19 @@ void Timeline::Add(const ThermalEvent& event) {
   const std::size_t at =
       Begin({.time_s = time_s, .until_s = time_s, .kind = HappeningKind::kThermal, .thermal = event.kind});
   if (at < kMost) newest_thermal_[event.kind] = at;
+}
+
+void Timeline::Add(const ClipState& state) {
+  const double time_s = TimeOf(state.stamp);
+  const std::uint32_t count = std::min<std::uint32_t>(state.count, kMaxClips);
+  // The newest is the last one; a clip that falls off makes them fewer.
+  for (std::uint32_t i = clips_; time_s >= 0 && i < count; ++i) {
+    (void)Begin({.time_s = time_s,
+                 .until_s = time_s,
+                 .kind = HappeningKind::kClip,
+                 .tool = static_cast<int>(state.clips[i].tool)});
+  }
+  clips_ = count;
 }
 
 std::vector<Happening> Timeline::happenings() const {

@@ -23,6 +23,7 @@ enum class HappeningKind : std::uint8_t {
   kPedalBlend,
   kForce,    ///< The tissue's force on a tool is above the highest that the scene's exercise allows.
   kSlip,     ///< Tissue slips out of closed jaws.
+  kClip,     ///< A clip applier leaves a clip.
   kThermal,  ///< A ThermalEvent; `thermal` names it.
 };
 
@@ -30,7 +31,7 @@ struct Happening {
   double time_s = 0;   ///< Session time of the begin [s].
   double until_s = 0;  ///< Session time of the end [s]; `time_s` for what has no duration.
   HappeningKind kind = HappeningKind::kTouch;
-  int tool = 0;                                           ///< Of kTouch, kGrasp, kRelease and kSlip.
+  int tool = 0;                                           ///< Of kTouch, kGrasp, kRelease, kSlip and kClip.
   ToolKind tool_kind = ToolKind::kNone;                   ///< Of the same.
   ThermalEventKind thermal = ThermalEventKind::kContact;  ///< Of kThermal.
 };
@@ -38,7 +39,7 @@ struct Happening {
 /// Short text for people, such as "Grasper (tool 1) grasps" or "Ureter warning".
 [[nodiscard]] std::string TextOf(const Happening& happening);
 /// Name of the kind in files and on the page: "touch", "grasp", "release", "pedal_cut", "pedal_coag", "pedal_blend",
-/// "force", "slip", "current", "blanching", "steam", "cut", "charring", "ureter_warning", "ureter_injury",
+/// "force", "slip", "clip", "current", "blanching", "steam", "cut", "charring", "ureter_warning", "ureter_injury",
 /// "nerve_warning", "nerve_injury", "region_reset", "organ_burnt".
 [[nodiscard]] const char* KeyOf(const Happening& happening);
 
@@ -56,6 +57,7 @@ class Timeline {
   void Add(const ContactModel& model);
   void Add(const HandleState& state);
   void Add(const ThermalEvent& event);
+  void Add(const ClipState& state);
 
   /// In the order of their begins. A pedal that is still down lasts until its newest message.
   [[nodiscard]] std::vector<Happening> happenings() const;
@@ -79,6 +81,7 @@ class Timeline {
   std::size_t left_out_ = 0;
   std::array<ToolKind, kMaxTools> kinds_{};
   std::array<bool, kMaxTools> touched_{}, holds_{};
+  std::uint32_t clips_ = 0;                                 ///< In the newest ClipState.
   std::array<std::size_t, kPedals> pressed_{};              ///< Index in `list_`, plus 1; 0: the pedal is up.
   std::map<ThermalEventKind, std::size_t> newest_thermal_;  ///< Index in `list_`.
 };

@@ -39,6 +39,25 @@ TEST(Timeline, TellsTouchGraspAndReleaseOfEachTool) {
   EXPECT_EQ(TextOf(timeline.happenings()[3]), "Hook (tool 2) touches");
 }
 
+TEST(Timeline, TellsEachClipOnce) {
+  Timeline timeline(test::kStart_ns);
+  const auto clips = [&](double time_s, std::uint32_t count) {
+    ClipState state;
+    state.stamp.stamp_ns = test::kStart_ns + static_cast<std::int64_t>(1e9 * time_s);
+    state.count = count;
+    for (Clip& clip : state.clips) clip.tool = 2;
+    timeline.Add(state);
+  };
+  clips(0.5, 0);
+  clips(1, 1);
+  clips(2, 1);  // Physics has restarted.
+  clips(3, 3);
+  clips(4, 2);  // One has fallen off.
+  clips(5, 3);
+  EXPECT_EQ(Told(timeline), "1.0-1.0 clip; 3.0-3.0 clip; 3.0-3.0 clip; 5.0-5.0 clip; ");
+  EXPECT_EQ(TextOf(timeline.happenings()[0]), "Clip applied (tool 3)");
+}
+
 TEST(Timeline, APedalLastsWhileItIsDown) {
   Timeline timeline(test::kStart_ns);
   for (const double time_s : {1.0, 1.1, 1.2}) timeline.Add(test::PedalAt(time_s, CauteryMode::kCut));

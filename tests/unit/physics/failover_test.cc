@@ -28,6 +28,7 @@ class Process {
         cautery_(bus->cautery.MakeOutput()),
         tears_(bus->tears.MakeOutput()),
         manifests_(bus->manifests.MakeOutput()),
+        clips_(bus->clips.MakeOutput()),
         checkpoint_(own, scene.hash, kCheckpointLayout,
                     CheckpointCapacity(static_cast<Index>(scene.rest_position.size()))),
         failover_(
@@ -35,7 +36,7 @@ class Process {
             [&, epoch_ns](bool is_follower, std::optional<PhysicsNode>* node) {
               node->emplace(scene,
                             PhysicsNode::Ports{*tools_, *handles_, *topology_, *open_cells_, *frames_, *contacts_,
-                                               *cautery_, *tears_, *manifests_},
+                                               *cautery_, *tears_, *manifests_, *clips_},
                             &checkpoint_, epoch_ns, 1, is_follower);
               node_ = node;
             },
@@ -61,6 +62,7 @@ class Process {
   std::unique_ptr<bus::Output<CauteryContact>> cautery_;
   std::unique_ptr<bus::Output<TearState>> tears_;
   std::unique_ptr<bus::Output<TickManifest>> manifests_;
+  std::unique_ptr<bus::Output<ClipState>> clips_;
   runtime::CheckpointFile checkpoint_;
   std::optional<PhysicsNode>* node_ = nullptr;
   Failover failover_;

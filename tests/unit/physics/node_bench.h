@@ -25,6 +25,7 @@ struct Bus {
   bus::InProcessTopic<CauteryContact> cautery;
   bus::InProcessTopic<TearState> tears;
   bus::InProcessTopic<TickManifest> manifests;
+  bus::InProcessTopic<ClipState> clips;
 };
 
 /// A node with its ports, and the writers of its inputs.
@@ -41,13 +42,14 @@ class Bench {
         cautery_out_(bus_.cautery.MakeOutput()),
         tear_out_(bus_.tears.MakeOutput()),
         manifest_out_(bus_.manifests.MakeOutput()),
+        clip_out_(bus_.clips.MakeOutput()),
         tool_out_(bus_.tools.MakeOutput()),
         handle_out_(bus_.handles.MakeOutput()),
         topology_out_(bus_.topology.MakeOutput()),
         open_out_(bus_.open_cells.MakeOutput()),
         node_(scene,
               {*tool_in_, *handle_in_, *topology_in_, *open_in_, *frame_out_, *contact_out_, *cautery_out_, *tear_out_,
-               *manifest_out_},
+               *manifest_out_, *clip_out_},
               checkpoint, epoch) {}
 
   void Send(double time_s) {
@@ -121,6 +123,7 @@ class Bench {
   std::unique_ptr<bus::Output<CauteryContact>> cautery_out_;
   std::unique_ptr<bus::Output<TearState>> tear_out_;
   std::unique_ptr<bus::Output<TickManifest>> manifest_out_;
+  std::unique_ptr<bus::Output<ClipState>> clip_out_;
   std::unique_ptr<bus::Output<ToolState>> tool_out_;
   std::unique_ptr<bus::Output<HandleState>> handle_out_;
   std::unique_ptr<bus::Output<TopologyState>> topology_out_;

@@ -105,6 +105,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
   TappedTopic<ContactModel> models(&writer);
   TappedTopic<CauteryContact> cautery(&writer);
   TappedTopic<TearState> tears(&writer);
+  TappedTopic<ClipState> clips(&writer);
   TappedTopic<TopologyState> topology(&writer);
   TappedTopic<OpenCells> open_cells(&writer);
   TappedTopic<TemperaturePatch> patches(&writer);
@@ -133,6 +134,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
     std::unique_ptr<bus::Output<CauteryContact>> cautery;
     std::unique_ptr<bus::Output<TearState>> tears;
     std::unique_ptr<bus::Output<TickManifest>> manifests;
+    std::unique_ptr<bus::Output<ClipState>> clips;
     std::unique_ptr<physics::PhysicsNode> node;
     std::uint64_t ticks = 0;
   };
@@ -149,12 +151,13 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
                      cautery.MakeOutput(),
                      tears.MakeOutput(),
                      manifests.MakeOutput(),
+                     clips.MakeOutput(),
                      nullptr,
                      0};
     p.node = std::make_unique<physics::PhysicsNode>(
         scene,
         physics::PhysicsNode::Ports{*p.tools, *p.handles, *p.topology, *p.open_cells, *p.frames, *p.models, *p.cautery,
-                                    *p.tears, *p.manifests},
+                                    *p.tears, *p.manifests, *p.clips},
         &physics_checkpoint, epoch, story.threads);
     return p;
   };
@@ -251,6 +254,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
     topology.Record(now);
     open_cells.Record(now);
     tears.Record(now);
+    clips.Record(now);
     patches.Record(now);
     events.Record(now);
   }

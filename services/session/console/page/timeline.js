@@ -10,7 +10,7 @@ const timeline = (() => {
     organ_burnt: ['▲', 'Organ', 'level-busy'],
     force: ['▲', 'Force', 'level-busy'], slip: ['△', 'Slip', 'level-busy'],
     pedal_cut: ['■', 'Pedal cut', 'cut-mark'], pedal_coag: ['■', 'Pedal coag', 'coag-mark'], pedal_blend: ['■', 'Pedal blend', 'cut-mark'],
-    grasp: ['▼', 'Grasp', 'hand-mark'], release: ['▽', 'Release', 'hand-mark'], touch: ['◇', 'Touch', 'hand-mark'],
+    clip: ['▣', 'Clip', 'hand-mark'], grasp: ['▼', 'Grasp', 'hand-mark'], release: ['▽', 'Release', 'hand-mark'], touch: ['◇', 'Touch', 'hand-mark'],
     cut: ['◆', 'Cut', 'heat-mark'], charring: ['⬟', 'Char', 'heat-mark'], blanching: ['●', 'Blanching', 'heat-mark'],
     steam: ['○', 'Steam', 'heat-mark'], current: ['✦', 'Current', 'heat-mark'], region_reset: ['□', 'Reset', 'level-off'],
   };
