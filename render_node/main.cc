@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "render_node/node/drawing_threads.h"
+#include "render_node/node/make_ports.h"
 #include "render_node/node/render_node.h"
 #include "render_node/offscreen/graphics_report.h"
 #include "services/base/runtime/realtime.h"
@@ -18,32 +19,16 @@ using namespace fulcrum;  // NOLINT: a main is nothing but names of other module
 ExitCode RunRender(app::NodeApp& app) {
   const bool spare = app.options().TakeFlag("--spare");
   if (spare) app::BecomeSpare(NodeId::kRender);
-  render::RenderSettings settings;
   const bool hands = app.options().TakeFlag("--hands");
-  settings.window = app.options().TakeFlag("--window") || hands;
-  settings.quality = render::QualityFromName(app.options().TakeValue("--quality", "auto"));
-  settings.frames = app.options().session / "frames";
-  settings.inputs = app.cart().inputs;
+  const bool window = app.options().TakeFlag("--window") || hands;
+  const render::RenderSettings settings{window, render::QualityFromName(app.options().TakeValue("--quality", "auto")),
+                                        app.options().session / "frames", app.cart().inputs};
   auto stage = render::MakeStage(app.scene(), settings.window, spare);
   if (spare && !app::WaitUntilNeeded(NodeId::kRender)) return ExitCode::kDone;
   // Collected before the ports start the threads of the bus: those that draw, this one and the rasteriser's.
   const std::vector<int> drawing = render::ThreadsOfProcess();
-  bus::Output<OperatorInput>* const operated = hands ? &app.MakeOutput<OperatorInput>() : nullptr;
-  // Not in Health: each source repeats its claim, so what a slow picture loses of a fast mouse is no loss.
   const std::unique_ptr<bus::Input<OperatorInput>> operators = hands ? app.bus().MakeInput<OperatorInput>() : nullptr;
-  const render::RenderPorts ports{app.MakeInput<TissueFrame>(),
-                                  app.MakeInput<TopologyState>(),
-                                  app.MakeInput<TemperaturePatch>(),
-                                  app.MakeInput<ToolState>(),
-                                  app.MakeInput<HandleState>(),
-                                  app.MakeInput<ThermalEvent>(),
-                                  app.MakeInput<CauteryContact>(),
-                                  app.MakeInput<GeneratorSetting>(),
-                                  app.MakeInput<ContactModel>(),
-                                  app.MakeInput<ClipState>(),
-                                  operated,
-                                  &app.MakeOutput<Picture>(),
-                                  operators.get()};
+  const render::RenderPorts ports = render::MakePorts(app, hands, operators.get());
   render::LowerPriority(drawing);
   render::RenderNode node(app.scene(), settings, ports, std::move(stage));
   runtime::Log(runtime::LogLevel::kInfo, node.display_description());
@@ -65,10 +50,7 @@ ExitCode RunRender(app::NodeApp& app) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (render::AsksForGraphics(argc, argv)) {
-    app::ConfineGraphics();
-    return static_cast<int>(render::PrintGraphics());
-  }
+  if (render::AsksForGraphics(argc, argv)) return static_cast<int>(render::PrintGraphics(app::ConfineGraphics));
   constexpr const char* kPurpose = "Draws what the laparoscope sees; --graphics alone prints what draws off screen.";
   return app::NodeMain(argc, argv, NodeId::kRender, kPurpose, RunRender);
 }

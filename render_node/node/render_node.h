@@ -41,7 +41,8 @@ struct RenderPorts {
   bus::Input<ClipState>& clips;
   bus::Output<OperatorInput>* operator_input;    ///< Null: the window operates nothing.
   bus::LoanOutput<Picture>* pictures = nullptr;  ///< Null: no live pictures.
-  /// What every source does, this one included. Null: no other source operates.
+  /// What every source does, this one included; not in Health, since each repeats its claim: what a slow picture loses
+  /// of a fast mouse is no loss. Null: no other source operates.
   bus::Input<OperatorInput>* operators = nullptr;
 };
 

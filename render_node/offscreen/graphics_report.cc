@@ -10,8 +10,9 @@ namespace fulcrum::render {
 
 bool AsksForGraphics(int argc, char** argv) { return argc == 2 && std::string_view(argv[1]) == "--graphics"; }
 
-ExitCode PrintGraphics() {
+ExitCode PrintGraphics(const std::function<void()>& confine) {
   try {
+    confine();
     std::puts(EglContext().description().c_str());
     return ExitCode::kDone;
   } catch (const std::exception& error) {
