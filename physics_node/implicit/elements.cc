@@ -368,9 +368,11 @@ void Elements::WriteForces(float h, const float* place, const float* d, const fl
 
 void Elements::WriteUnbalanced(const float* d, const float* residual, const Regions& regions,
                                std::span<ContactRow> contacts) {
-  const auto for_particles = [this](const auto& body) {
+  // A contact of two solids can be as stiff, but its weights sum to 0, so that a share of them is no part of anything.
+  const auto of_tool = [&](std::size_t i) { return IsStiff(contacts_[i]) && !IsTissue(contacts[contact_row_[i]]); };
+  const auto for_particles = [&](const auto& body) {
     for (std::size_t i = 0; i < contacts_.size(); ++i) {
-      for (std::size_t k = 0; IsStiff(contacts_[i]) && k < static_cast<std::size_t>(contacts_[i].count); ++k) {
+      for (std::size_t k = 0; of_tool(i) && k < static_cast<std::size_t>(contacts_[i].count); ++k) {
         body(i, contacts_[i].at[k], contacts_[i].weight[k]);
       }
     }
@@ -378,7 +380,7 @@ void Elements::WriteUnbalanced(const float* d, const float* residual, const Regi
   for_particles([&](std::size_t, ParticleRef at, float) { row_weights_[at.base] = 0.0f; });
   for_particles([&](std::size_t, ParticleRef at, float weight) { row_weights_[at.base] += weight; });
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
-    if (IsStiff(contacts_[i])) {
+    if (of_tool(i)) {
       const Element& e = contacts_[i];
       ContactRow& row = contacts[contact_row_[i]];
       const Vec3f along = Combine(e, d), linear = contact_force_[i] - e.kt * along - e.m * e.m.dot(along);

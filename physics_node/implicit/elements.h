@@ -36,7 +36,8 @@ struct Selection {
 
 class Elements {
  public:
-  /// Contacts stiffer than this are with a tool; softer ones are tissue on tissue, as the fat around [N/m].
+  /// Contacts stiffer than this are with a tool, or of a solid with another that it presses; softer ones are tissue on
+  /// tissue, as the fat around [N/m].
   static constexpr float kStiffContact_N_per_m = 500.0f;
   /// Contacts that memory is reserved for, of tools and of tissue against tissue together; with more the lists grow.
   static constexpr std::size_t kReservedContacts = 4608;
@@ -82,7 +83,7 @@ class Elements {
   void FitClips(const float* place, const Regions& regions) {
     clips_->Linearise(place, [&](ParticleRef at) { return regions.computed(regions.partition().Of(at)); });
   }
-  /// A contact with a tool, not of tissue with tissue.
+  /// A contact with a tool, or of a solid with another; not with a sheet.
   [[nodiscard]] static bool IsStiff(const Element& contact) { return contact.m.squaredNorm() > kStiffContact_N_per_m; }
 
   // What reads fields and what writes them are apart: the first runs beside kernels that write other fields. Forces and
@@ -118,9 +119,9 @@ class Elements {
   /// Normal and friction forces of contacts with tools at `place` + `d`, sliding measured from `start`, h ago.
   static void WriteForces(float h, const float* place, const float* d, const float* start,
                           std::span<ContactRow> contacts);
-  /// Afterwards, for those of the linearisation: the part of these forces that the truncated solve has left unbalanced,
-  /// from its `residual` at `d`. A particle of several rows counts by weight; one that is not computed has no residual:
-  /// it was in balance when it fell asleep.
+  /// Afterwards, for the tools' contacts of the linearisation: the part of these forces that the truncated solve has
+  /// left unbalanced, from its `residual` at `d`. A particle of several rows counts by weight; one that is not computed
+  /// has no residual: it was in balance when it fell asleep.
   void WriteUnbalanced(const float* d, const float* residual, const Regions& regions, std::span<ContactRow> contacts);
   /// Stiffness of a contact in its normal direction [N/m].
   [[nodiscard]] static float ContactStiffness(const ContactRow& row);

@@ -251,6 +251,39 @@ TEST_F(OnSeveralSolids, ThatWereAtRestSleepAfterARestart) {
   }
 }
 
+/// A hook presses the pad beside the lump, whose vertices lie on the same triangles, and then keeps still.
+TEST(TwoSolidsUnderATool, HaveASteadyForce) {
+  scene::SceneSettings settings = scene::Small();
+  settings.physics.mode = PhysicsMode::kAccurate;
+  settings.physics.gravity = kEarth;
+  scene::Anatomy anatomy = scene::ProceduralAnatomy(settings);
+  const Vec3d corner(0.12, -0.02, 0);
+  scene::SolidBody pad = Box("pad", corner, {0.04, 0.04, 0.015}, {8, 8, 3}, 2e4);
+  Fix(&pad, [](const Vec3d& p) { return p.z() < 1e-6; });
+  anatomy.solids.push_back(std::move(pad));
+  anatomy.solids.push_back(Box("lump", corner + Vec3d(0.0123, 0.0117, 0.016), {0.02, 0.02, 0.02}, {4, 4, 4}, 4e4));
+  const scene::SceneData data = scene::AssembleScene(settings, anatomy);
+  const SceneView scene = data.View();
+  TissueSimulation simulation(scene);
+  std::array<ToolInput, kMaxTools> tools{};
+  for (int i = 0; i < 200; ++i) simulation.Step(tools);
+  tools[1].present = true;
+  tools[1].pose.q_WT = Quatf(0, 1, 0, 0);  // Its tip points down.
+  constexpr int kPress = 60, kSteps = 120;
+  float last = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    tools[1].pose.p_WT = Vec3f(0.1281f, -0.004f, 0.020f - 0.00015f * static_cast<float>(std::min(i, kPress)));
+    simulation.Step(tools);
+    (void)simulation.Contacts(1);
+    const float now = simulation.solver_force(1).norm();
+    if (i > kPress + 10) {
+      EXPECT_GT(now, 0.3f);
+      EXPECT_NEAR(now, last, 0.2f * last) << i;
+    }
+    last = now;
+  }
+}
+
 TEST_F(UnderGravity, AreTheSameOnAnyNumberOfThreads) {
   TissueSimulation one(scene_, 1), three(scene_, 3);
   three.LetThreadsHelp(true);
