@@ -127,6 +127,10 @@ bool ImplicitSolver::Stiffness(const StiffnessQuery& query, float* newton_per_m)
   float pull = 0;
   for (const ParticleRef particle : query.at) {
     pull -= FieldAt(at.residual.data(), particle).dot(query.direction);
+    // The product of the organ, unlike that of the membrane, contains the mass of what is held.
+    if (model_.layout.InTube(particle)) {
+      pull -= inertia * system.organ.mass[particle.base / kVertexFloats] * kProbeStep_m;
+    }
   }
   state_.elements.ExcludeContacts(false);
   ReleaseQueried(context_, query.at, &at, &scratch_.queried);

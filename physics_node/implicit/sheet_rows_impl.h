@@ -272,7 +272,7 @@ FULCRUM_INLINE void LineariseRow(const Sheet& sheet, const Inertia& inertia, con
         }
       }
     }
-    if (!only_below || (triangles && stores)) {
+    if (!only_below || stores) {
       constexpr int kDirections[3] = {1, 2, 0};
       for (int i = 0; i < (only_below ? 2 : 3); ++i) {
         lines[i].kt.Store(matrix.kt[kDirections[i]] + node);
