@@ -53,6 +53,27 @@ void CoarseSpace::MarkEdit(std::uint32_t row, std::uint32_t col, std::size_t d) 
   mark(std::min(row + (d != 0 ? 1 : 0), layout_.rows - 1), std::min(col + (d != 1 ? 1 : 0), layout_.cols - 1));
 }
 
+/// Where the next hat is near, a hat is so steep that the samples, made for a distance of four, are far too soft:
+/// by 2.5 times beside a group of one column. With three columns they are within a fifth, which the blocks have room
+/// for. And beside the last column half of the samples have no edge to the right.
+void CoarseSpace::MarkSteepHats() {
+  if (hats_.rows == 0) return;
+  const auto is_short = [](int distance) { return distance > 0 && distance <= kHatSpacing / 2; };
+  // The last group of a lane is the shorter one: its hat, and the first of the next lane.
+  const bool columns = is_short(static_cast<int>(layout_.slots) % kHatSpacing);
+  const bool last_rows = is_short((sheet_rows_ - 1) % kHatSpacing);
+  const std::uint32_t before_last = std::max(layout_.cols, 2u) - 2;
+  const bool has_middle = layout_.Offset(0, before_last) / kLanes % kHatSpacing == 0;
+  for (int r = 0; r < hats_.rows; ++r) {
+    for (std::uint32_t i = 0; i < hats_.width; ++i) {
+      const bool beside = columns && i > 0 && (i < kLanes || i + kLanes >= hats_.width);
+      if (beside || (last_rows && r + 2 == hats_.rows) || (has_middle && i == HatsOf(before_last)[0])) {
+        blocks_.edited.push_back(static_cast<std::uint32_t>(r) * static_cast<std::uint32_t>(hats_.width) + i);
+      }
+    }
+  }
+}
+
 void CoarseSpace::ScaleHats(const Sheet& sheet) {
   std::vector<std::uint32_t>& edited = blocks_.edited;
   std::sort(edited.begin(), edited.end());
@@ -66,13 +87,15 @@ void CoarseSpace::ScaleHats(const Sheet& sheet) {
     const auto r = static_cast<std::size_t>(hat / hats_.width);
     const int centre_row = hats_.centre[r], in_row = static_cast<int>(hat % hats_.width);
     const int slot = kHatSpacing * (in_row / kLanes), first_col = in_row % kLanes * static_cast<int>(layout_.slots);
-    float exact = 0, sampled = 0;
+    float exact = 0, sampled = 0, steep = 1;
+    std::array<float, 3> of_kind{};
     for (int row = centre_row - kHatSpacing; row < centre_row + kHatSpacing; ++row) {
       for (int col = first_col + slot - kHatSpacing; col < first_col + slot + kHatSpacing; ++col) {
         for (std::size_t d = 0; d < 3; ++d) {
           if (whole(row, col, d)) {
             const float step = HatAt(hat, row + (d != 0 ? 1 : 0), col + (d != 1 ? 1 : 0)) - HatAt(hat, row, col);
             exact += step * step;
+            of_kind[d] += step * step;
           }
         }
       }
@@ -85,10 +108,25 @@ void CoarseSpace::ScaleHats(const Sheet& sheet) {
         sampled += whole(row, first_col + at, d) ? edges : 0.0f;
       }
     }
+    // Towards a hat that is near, the edges of one kind count for more than on the mean.
+    for (std::size_t d = 0; d < 3; ++d) {
+      steep = std::max(steep, of_kind[d] / (d == 2 ? kHatDiagonalEdges : kHatStraightEdges));
+    }
     const bool measurable = exact > kLeastEdgesLeft && sampled > kLeastSampledEdges;
-    blocks_.scale[hat] = measurable ? std::max(exact / sampled, 1.0f) : 0.0f;
+    blocks_.scale[hat] = measurable ? std::max(exact / sampled, steep) : 0.0f;
   }
   edited.clear();
+}
+
+bool CoarseSpace::FollowsComputed(const Regions& regions, const Slides& slides) const {
+  for (int row = 0; row < grid_.rows; ++row) {
+    if (regions.whole(grid_.body[static_cast<std::size_t>(row * grid_.columns)])) return true;
+  }
+  const Partition& partition = regions.partition();
+  return (grid_.rows == 0 && regions.whole(0)) || std::ranges::any_of(slides.elements(), [&](const Element& slide) {
+           return std::ranges::any_of(
+               slide.at, [&](ParticleRef at) { return regions.whole(partition.BodyOf(partition.Of(at))); });
+         });
 }
 
 void CoarseSpace::UpdateRegions(const Regions& regions) {

@@ -181,6 +181,7 @@ void CoarseSpace::BuildHats() {
   contacts_.stiff.reserve(kHatsPerContact * kReservedStiffContacts);
   blocks_.edited.reserve(kReservedEdits);
   blocks_.off.reserve(static_cast<std::size_t>(hats_.rows));
+  MarkSteepHats();
   scratch_.residual = FloatArray(3 * count);
   scratch_.value = FloatArray(3 * count);
   ShareColumns();
@@ -240,19 +241,16 @@ struct CoarseSpace::Lattice {
 
 /// Small solids get a lattice as fine as their number of vertices permits: bending of something thin is not in the span
 /// of a coarse one, and converges over seconds. Large ones get a coarser one: the factor's cost grows faster than
-/// theirs.
+/// theirs. A single one begins with kLattice_m, and its lattice becomes coarser only.
 CoarseSpace::Lattice CoarseSpace::LatticeOf(const Solid& solid, std::size_t solids, const ElasticModel& model) {
   constexpr double kFiner = 0.75, kFinest_m = 0.002;
   // A lattice has at least the nodes of one cell.
   constexpr std::size_t kMostNodes = 96, kVerticesPerNode = 8, kLeastNodes = 8;
-  // Of all solids but the organ: matrix and factor grow with the square of the number.
+  // Of all solids but the organ, and of a single one: matrix and factor grow with the square of the number.
   constexpr std::size_t kNodesOfAll = 480;
   const std::span<const Vec3d> points = std::span(model.rest_position).subspan(solid.first_vertex, solid.vertex_count);
   Lattice lattice;
   if (points.empty()) return lattice;
-  lattice.origin = points[0];
-  for (const Vec3d& p : points) lattice.origin = lattice.origin.cwiseMin(p);
-  lattice.origin.array() -= 1e-6;
   const auto nodes = [&](const Lattice& of) {
     std::set<std::array<int, 3>> keys;
     for (const Vec3d& p : points) {
@@ -264,6 +262,13 @@ CoarseSpace::Lattice CoarseSpace::LatticeOf(const Solid& solid, std::size_t soli
     }
     return keys.size();
   };
+  if (solids < 2) {
+    while (nodes(lattice) > kNodesOfAll) lattice.spacing /= kFiner;
+    return lattice;
+  }
+  lattice.origin = points[0];
+  for (const Vec3d& p : points) lattice.origin = lattice.origin.cwiseMin(p);
+  lattice.origin.array() -= 1e-6;
   const std::size_t share = solid.first_vertex == 0 ? points.size() : kNodesOfAll / (solids - 1);
   const std::size_t most =
       std::max(kLeastNodes, std::min(std::max(kMostNodes, points.size() / kVerticesPerNode), share));
@@ -280,8 +285,12 @@ void CoarseSpace::BuildLattice(const TissueScene& scene, const ElasticModel& mod
   grid_.nodes = grid_.columns * grid_.rows;
   const std::vector<Index> solid = SolidOfVertices(scene);
   std::vector<Lattice> lattices;
-  for (const Solid& s : scene.solids) lattices.push_back(LatticeOf(s, scene.solids.size(), model));
-  if (scene.solids.size() < 2) lattices.assign(1, Lattice{});
+  std::vector<Solid> solids(scene.solids.begin(), scene.solids.end());
+  if (solids.empty()) {  // A scene of one organ, or of none.
+    solids.emplace_back();
+    solids.front().vertex_count = scene.tube_vertex_count;
+  }
+  for (const Solid& s : solids) lattices.push_back(LatticeOf(s, solids.size(), model));
   std::map<std::pair<Index, std::array<int, 3>>, std::uint16_t> numbers;
   for (Index v = 0; v < scene.tube_vertex_count; ++v) {
     LatticePlace weights{};

@@ -43,13 +43,10 @@ class CoarseSpace {
   /// Rows of hats whose middle is one of the sheet's rows [first, end): first and end of them.
   [[nodiscard]] std::pair<int, int> HatRows(int first, int end) const;
 
-  /// Coarse nodes of a sheet are in use: the matrix follows it.
-  [[nodiscard]] bool SheetIsWhole(const Regions& regions) const {
-    for (int row = 0; row < grid_.rows; ++row) {
-      if (regions.whole(grid_.body[static_cast<std::size_t>(row * grid_.columns)])) return true;
-    }
-    return grid_.rows == 0 && regions.whole(0);
-  }
+  /// Coarse nodes of a sheet, or of solids that slide, are in use: the matrix follows these.
+  [[nodiscard]] bool FollowsComputed(const Regions& regions, const Slides& slides) const;
+  /// Memory of the matrix and time of a solve grow with the square of their number.
+  [[nodiscard]] int nodes() const { return grid_.nodes; }
   /// The edge from a node of the sheet in direction `d` is cut or whole again; in force after ScaleHats.
   void MarkEdit(std::uint32_t row, std::uint32_t col, std::size_t d);
   /// Blocks of hats are sampled at their middle. Where a cut goes through the samples they are scaled to the edges that
@@ -166,6 +163,7 @@ class CoarseSpace {
   void PlaceCoarseNodes(const TissueScene& scene);
   void ShareColumns();
   void BuildHats();
+  void MarkSteepHats();
   struct Lattice;
   static Lattice LatticeOf(const Solid& solid, std::size_t solids, const ElasticModel& model);
   void BuildLattice(const TissueScene& scene, const ElasticModel& model);

@@ -207,7 +207,7 @@ void LineariseVerticesAndLevels(const SolverContext& context, const Inertia& ine
     });
   };
   ForTasksAndSideTask(&context.workers, state->regions.computed(), body, [&] {
-    if (state->coarse_due && state->coarse.SheetIsWhole(state->regions)) {
+    if (state->coarse_due && state->coarse.FollowsComputed(state->regions, state->elements.slides())) {
       state->coarse.AssembleNextPart(system.sheet, system.sheet_matrix, inertia.inertia, state->elements.slides());
       state->coarse_due = false;
     }
