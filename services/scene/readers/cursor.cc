@@ -28,6 +28,15 @@ void Cursor::Fail(const std::string& reason) const {
   RefuseMesh(*name_, "line " + std::to_string(line) + ": " + reason);
 }
 
+bool Cursor::IsTiny(std::string_view number) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), value);
+  if (end != number.data() + number.size()) return false;
+  if (error == std::errc()) return std::abs(value) < 1;
+  const std::size_t exponent = number.find_first_of("eE");
+  return exponent != std::string_view::npos && number.substr(exponent + 1).starts_with('-');
+}
+
 void Cursor::FailWord(std::string_view word, const char* what) const {
   Fail(word.empty() ? std::string("the file ends where ") + what + " should be: it was cut short"
                     : Quote(word) + " where " + what + " should be");

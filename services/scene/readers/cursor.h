@@ -89,6 +89,9 @@ class Cursor {
 
  private:
   [[nodiscard]] static bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+  /// True for a number such as 3.7e-49, which is too small for a float: rounding noise of a program that computes in
+  /// double.
+  [[nodiscard]] static bool IsTiny(std::string_view number);
   [[noreturn]] void FailWord(std::string_view word, const char* what) const;
 
   template <class T>
@@ -100,6 +103,9 @@ class Cursor {
     }
     T value{};
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (std::is_floating_point_v<T> && error == std::errc::result_out_of_range && IsTiny(word)) {
+      return T{0};
+    }
     if (word.empty() || error != std::errc() || end != word.data() + word.size()) {
       FailWord(full, what);
     }

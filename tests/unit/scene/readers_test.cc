@@ -1,5 +1,7 @@
 // Readers of mesh files: every variant of every format gives the same mesh; altered, truncated or absurd files are
 // refused with file, place, value and valid values.
+#include "services/scene/readers/readers.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -55,6 +57,23 @@ class EveryVariant : public testing::TestWithParam<MeshSample> {};
 TEST(AsciiStl, MayEndInTwoWords) {
   const MeshSample& sample = Sample("stl_ascii");
   EXPECT_EQ(Refusal(sample, With(sample.bytes, "endsolid", "end solid")), "");
+}
+
+/// Rounding noise of programs that compute in double is no fault, whatever the type in which a file is read.
+TEST(TextOfNumbers, TooSmallForTheirTypeAreZero) {
+  const std::string name = "x";
+  for (const char* word : {"3.7e-49", "-3.7e-49", "1e-400", "+1E-4000"}) {
+    EXPECT_EQ(Cursor(word, name).Take<float>("a number"), 0.0f) << word;
+  }
+  EXPECT_EQ(Cursor("1e-400", name).Take<double>("a number"), 0.0);
+  for (const char* word : {"3.7e49", "1e400", "3.7e-49x", "e-9"}) {
+    EXPECT_THROW((void)Cursor(word, name).Take<float>("a number"), InputError) << word;
+  }
+  EXPECT_THROW((void)Cursor("99999999999", name).Take<std::int32_t>("a number"), InputError);
+  const std::string stl =
+      "solid x\nfacet normal 0 0 1\nouter loop\nvertex 3.7e-49 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+      "endsolid x\n";
+  EXPECT_EQ(ReadStl(stl, "tiny.stl").vertices[0], Vec3d::Zero());
 }
 
 TEST_P(EveryVariant, GivesTheMeshThatWasWritten) {
