@@ -209,6 +209,7 @@ ExitCode Up(const Words& words) {
   request.library = runtime::ShareFolder() / "scenes";
   request.compiler = settings.programs / "scene_compiler";
   request.cache = SceneCache(settings.programs);
+  request.for_services = !settings.attach.empty();
   settings.scene = ResolveScene(request);
   if ((settings.remote >> static_cast<unsigned>(NodeId::kPhysics) & 1u) == 0) {
     const std::string expected = ForecastOf(settings.scene, request.cache, settings.programs / "scene_profiler",

@@ -13,6 +13,7 @@
 #include <thread>
 #include <utility>
 
+#include "services/base/config/strict_yaml.h"
 #include "services/base/core/error.h"
 #include "services/base/core/hash.h"
 #include "services/base/runtime/child_process.h"
@@ -35,39 +36,33 @@ void AddFile(Hash64* hash, const fs::path& file) {
   hash->AddValue(static_cast<std::int64_t>(fs::last_write_time(file, error).time_since_epoch().count()));
 }
 
-/// Words of the YAML that may name a file or folder.
-std::vector<std::string> PathWords(const std::string& yaml) {
-  constexpr std::string_view kSeparators = " \t\r\n\"',[]{}";
-  constexpr std::size_t kLongestName = 255;
-  std::vector<std::string> words;
-  for (std::size_t begin = 0; (begin = yaml.find_first_not_of(kSeparators, begin)) != std::string::npos;) {
-    const std::size_t end = std::min(yaml.find_first_of(kSeparators, begin), yaml.size());
-    const std::string word = yaml.substr(begin, end - begin);
-    begin = end;
-    if (word.size() <= kLongestName) words.push_back(word);
+/// What one description says.
+struct DescriptionText {
+  std::vector<std::string> values;  ///< Of all keys: some name a file or folder.
+  std::string base;
+};
+
+/// Nothing of a text that is no description: scene_compiler says what is wrong with it.
+DescriptionText TextsOf(const std::string& yaml) {
+  try {
+    config::StrictYaml description = config::StrictYaml::FromText(yaml, "scene");
+    return {description.Values(), description.root().TextOr("base", "")};
+  } catch (const InputError&) {
+    return {};
   }
-  // Quoted names may hold separators.
-  for (std::size_t begin = 0; (begin = yaml.find_first_of("\"'", begin)) != std::string::npos;) {
-    const std::size_t end = yaml.find_first_of(std::string{yaml[begin], '\n'}, begin + 1);
-    if (end != std::string::npos && yaml[end] == yaml[begin] && end - begin - 1 <= kLongestName) {
-      words.push_back(yaml.substr(begin + 1, end - begin - 1));
-    }
-    begin = std::min(end, yaml.size() - 1) + 1;
-  }
-  return words;
 }
 
 /// What a description and its bases name.
 struct Named {
   std::set<fs::path> descriptions;  ///< The bases.
   std::set<fs::path> folders;       ///< Of the description and its bases.
-  std::set<std::string> words;      ///< All that may name a file or folder, of all of them.
+  std::set<std::string> values;     ///< All that may name a file or folder, of all of them.
 };
 
 void AddDescription(const std::string& yaml, const fs::path& folder, const fs::path& library, Named* named) {
   named->folders.insert(folder);
-  const std::vector<std::string> words = PathWords(yaml);
-  named->words.insert(words.begin(), words.end());
+  const DescriptionText said = TextsOf(yaml);
+  named->values.insert(said.values.begin(), said.values.end());
   const auto add_base = [&](const fs::path& file) {
     std::error_code error;
     if (!fs::is_regular_file(file, error)) return;
@@ -75,35 +70,26 @@ void AddDescription(const std::string& yaml, const fs::path& folder, const fs::p
     const fs::path whole = fs::canonical(file, error);  // A shipped scene is a link in a build tree.
     if (named->descriptions.insert(whole).second) AddDescription(ReadText(file), whole.parent_path(), library, named);
   };
-  for (const std::string& word : words) {
-    if (fs::path(word).extension() == ".yaml") add_base(folder / word);
-  }
-  // The name of a shipped scene as base, or a file of another extension.
-  constexpr std::string_view kBase = "\nbase:";
-  if (const std::size_t at = ("\n" + yaml).find(kBase); at != std::string::npos) {
-    const std::size_t begin = yaml.find_first_not_of(" \t\"'", at + kBase.size() - 1);
-    const std::string name =
-        begin == std::string::npos ? "" : yaml.substr(begin, yaml.find_first_of(" \t\r\n\"'#", begin) - begin);
-    add_base(folder / name);
-    add_base(library / (name + ".yaml"));
-  }
+  if (said.base.empty()) return;
+  add_base(folder / said.base);
+  add_base(library / (said.base + ".yaml"));
 }
 
-/// Every word that names an existing file, in the folder of the scene or a base, in the data folder or in a folder that
-/// a word names, counts as an input: a superfluous input costs a compilation, a missing one would run an outdated
+/// Every value that names an existing file, in the folder of the scene or a base, in the data folder or in a folder
+/// that a value names, counts as an input: a superfluous input costs a compilation, a missing one would run an outdated
 /// anatomy.
 std::set<fs::path> FilesOf(const Named& named, const fs::path& data) {
   std::error_code error;
   std::set<fs::path> places = named.folders, files = named.descriptions;
   if (!data.empty()) places.insert(data);
   for (const fs::path& folder : named.folders) {
-    for (const std::string& word : named.words) {
-      if (fs::is_directory(folder / word, error)) places.insert(folder / word);
+    for (const std::string& value : named.values) {
+      if (fs::is_directory(folder / value, error)) places.insert(folder / value);
     }
   }
   for (const fs::path& place : places) {
-    for (const std::string& word : named.words) {
-      const fs::path file = place / word;
+    for (const std::string& value : named.values) {
+      const fs::path file = place / value;
       if (!fs::is_regular_file(file, error)) continue;
       files.insert(file);
       // A mesh of TetGen is read with the files beside it.
@@ -129,8 +115,14 @@ fs::path FindYaml(const SceneRequest& request) {
   if (fs::is_regular_file(request.name, error)) {
     return request.name;
   }
+  if (request.name.find('/') != std::string::npos) {
+    throw InputError("no scene \"" + request.name + "\": " + (error ? error.message() : "is no file") +
+                     (request.for_services ? "; services do not see /home, /root and /tmp: put scenes and meshes where "
+                                             "user fulcrum can read them, for example into /etc/fulcrum/scenes"
+                                           : "; give a file, or the name of a shipped scene"));
+  }
   fs::path shipped = request.library / (request.name + ".yaml");
-  if (request.name.find('/') == std::string::npos && fs::is_regular_file(shipped, error)) {
+  if (fs::is_regular_file(shipped, error)) {
     return fs::canonical(shipped);  // In a build tree a link: meshes are searched relative to the scene's own folder.
   }
   std::string known;

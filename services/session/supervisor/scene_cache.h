@@ -15,6 +15,7 @@ struct SceneRequest {
   std::filesystem::path library;     ///< Folder of the shipped scenes.
   std::filesystem::path compiler;    ///< Program scene_compiler.
   std::filesystem::path cache;       ///< Folder of compiled scenes.
+  bool for_services = false;         ///< systemd hides some folders from them.
 };
 
 /// Versions of one scene that the cache keeps, the last used ones: those of some changes and back again.

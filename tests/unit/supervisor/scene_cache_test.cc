@@ -2,6 +2,7 @@
 #include "services/session/supervisor/scene_cache.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -73,6 +74,26 @@ TEST_F(SceneCacheTest, AMeshInAFolderOfAPlainNameIsAnInput) {
     std::ofstream(request_.library / "scans" / mesh) << "solid changed";
     (void)ResolveScene(request_);
     EXPECT_EQ(Runs(), before + 1) << scene;
+  }
+}
+
+TEST_F(SceneCacheTest, NamesWithBlanksNeedNoQuotes) {
+  for (const char* mesh : {"my liver.obj", "liver (1).stl", "left, right.ply", "two words.stl"}) {
+    std::ofstream(folder_.path() / mesh) << "solid";
+  }
+  std::ofstream(folder_.path() / "my base.yaml") << "name: base\nfixed:\n  - mesh: left, right.ply\n";
+  std::ofstream(folder_.path() / "two.yaml")
+      << "name: two\nbase: my base.yaml  # below\norgan: {import: {organ: my liver.obj, unit: mm}}\n"
+         "bodies:\n  - {mesh: liver (1).stl, name: one}\n  - mesh: two\n      words.stl\n";
+  request_.name = (folder_.path() / "two.yaml").string();
+  (void)ResolveScene(request_);
+  (void)ResolveScene(request_);
+  int runs = 1;
+  EXPECT_EQ(Runs(), runs);
+  for (const char* mesh : {"my liver.obj", "liver (1).stl", "left, right.ply", "two words.stl", "my base.yaml"}) {
+    std::ofstream(folder_.path() / mesh, std::ios::app) << "\n# changed";
+    (void)ResolveScene(request_);
+    EXPECT_EQ(Runs(), ++runs) << mesh;
   }
 }
 
@@ -171,6 +192,30 @@ TEST_F(SceneCacheTest, UnknownNameListsTheShippedOnes) {
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("one"), std::string::npos) << error.what();
   }
+}
+
+TEST_F(SceneCacheTest, APathThatCannotBeReadIsRefusedWithTheReason) {
+  const auto refusal = [&](const fs::path& path) {
+    request_.name = path.string();
+    try {
+      (void)ResolveScene(request_);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const std::string missing = refusal(folder_.path() / "none.yaml");
+  EXPECT_NE(missing.find("none.yaml\": No such file"), std::string::npos) << missing;
+  EXPECT_EQ(missing.find("/home"), std::string::npos) << missing;
+  EXPECT_NE(refusal(folder_.path()).find("is no file"), std::string::npos);
+  request_.for_services = true;
+  const std::string unseen = refusal(folder_.path() / "none.yaml");
+  EXPECT_NE(unseen.find("services do not see /home, /root and /tmp"), std::string::npos) << unseen;
+  if (::geteuid() == 0) return;  // Root reads every folder.
+  fs::create_directory(folder_.path() / "closed");
+  fs::permissions(folder_.path() / "closed", fs::perms::none);
+  EXPECT_NE(refusal(folder_.path() / "closed" / "x.yaml").find("Permission denied"), std::string::npos);
+  fs::permissions(folder_.path() / "closed", fs::perms::owner_all);
 }
 
 TEST_F(SceneCacheTest, CompilersComplaintIsPassedOn) {
