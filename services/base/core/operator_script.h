@@ -26,11 +26,13 @@ struct ScriptPoint {
 [[nodiscard]] inline ScriptPoint EvaluateScript(std::span<const ScriptKey> script, std::uint32_t tool, double time_s) {
   const auto first = std::lower_bound(script.begin(), script.end(), tool,
                                       [](const ScriptKey& key, std::uint32_t t) { return key.tool < t; });
-  const auto end = std::find_if(first, script.end(), [tool](const ScriptKey& key) { return key.tool != tool; });
+  const auto end =
+      std::upper_bound(first, script.end(), tool, [](std::uint32_t t, const ScriptKey& key) { return t < key.tool; });
   if (first == end) {
     return {};
   }
-  const auto next = std::find_if(first, end, [time_s](const ScriptKey& key) { return key.time_s > time_s; });
+  // Of an hour that a hand performs there are 180,000 keys of a tool, and the servo asks each millisecond.
+  const auto next = std::upper_bound(first, end, time_s, [](double t, const ScriptKey& key) { return t < key.time_s; });
   if (next == first) {
     return {true, first->p_W, first->jaw_rad, 0u, 0.0f, first->roll_rad};
   }

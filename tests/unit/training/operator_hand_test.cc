@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <ctime>
 #include <filesystem>
 
 #include "services/base/core/error.h"
@@ -66,6 +68,54 @@ TEST(OperatorHand, StrictlyInTimeAndALateHandIsLateWithToolPedalAndJaw) {
   EXPECT_LE(down_s, 2 + 1.25 * 0.6 + 0.02);
   EXPECT_NEAR(up_s - down_s, 2, 0.021);
   EXPECT_LT((performed.back().p_W - kScript.back().p_W).norm(), 1e-6f);
+}
+
+std::vector<ScriptKey> LongScript(int keys) {
+  std::vector<ScriptKey> script;
+  for (std::uint32_t tool : {0u, 1u}) {
+    for (int i = 0; i < keys; ++i) {
+      const float time_s = 0.02f * static_cast<float>(i);
+      script.push_back({time_s, tool, Vec3f(time_s, 0, 0), 0, kPedalNone, static_cast<float>(i % 100)});
+    }
+  }
+  return script;
+}
+
+TEST(Script, IsReadBetweenTheKeysAroundTheTime) {
+  constexpr int kKeys = 180001;
+  const std::vector<ScriptKey> script = LongScript(kKeys);
+  for (const std::uint32_t tool : {0u, 1u}) {
+    for (int i = 0; i + 1 < kKeys; i += 4999) {
+      const ScriptKey* a = &script[tool * kKeys + static_cast<std::size_t>(i)];
+      const double time_s = 0.5 * (static_cast<double>(a->time_s) + static_cast<double>((a + 1)->time_s));
+      const std::array two{a[0], a[1]};
+      const ScriptPoint of_all = EvaluateScript(script, tool, time_s), of_two = EvaluateScript(two, tool, time_s);
+      EXPECT_EQ(of_all.p_W, of_two.p_W) << i;
+      EXPECT_EQ(of_all.power_W, of_two.power_W) << i;
+      EXPECT_EQ(EvaluateScript(script, tool, static_cast<double>(a->time_s)).p_W, a->p_W) << "at a key";
+    }
+  }
+  EXPECT_FALSE(EvaluateScript(script, 2, 1).present);
+  EXPECT_EQ(EvaluateScript(script, 0, 1e6).p_W, script[kKeys - 1].p_W);
+}
+
+/// The servo asks each millisecond, however long the session is.
+TEST(Script, CostsTheSameHoweverLongItIs) {
+  const auto seconds = [](const std::vector<ScriptKey>& script) {
+    const auto now = [] {
+      timespec t{};
+      ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+      return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+    };
+    const double last_s = static_cast<double>(script.back().time_s), begin = now();
+    float sum = 0;
+    for (int i = 0; i < 2000; ++i) sum += EvaluateScript(script, 1, last_s * i / 2000).p_W.x();
+    EXPECT_GT(sum, 0);
+    return now() - begin;
+  };
+  const std::vector<ScriptKey> one = LongScript(301), many = LongScript(180001);
+  (void)seconds(one);
+  EXPECT_LT(seconds(many), 60 * seconds(one)) << "600 times as many keys";
 }
 
 TEST(OperatorHand, IsNamedInTheSceneAndOnTheCommandLine) {
