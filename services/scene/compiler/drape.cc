@@ -12,7 +12,6 @@ namespace fulcrum::scene {
 namespace {
 
 constexpr int kRadiusRows = 65, kRadiusAngles = 65;  ///< Samples of the organ's outer radius.
-constexpr double kRayLength_m = 0.08;                ///< Longer than the thickness of any organ.
 /// If a larger share of the rays misses, the centre line is not inside the organ.
 constexpr double kMissedRays = 0.10;
 constexpr int kRadiusSmoothing = 12, kSheetSmoothing = 40;
@@ -37,7 +36,7 @@ CrossFrame FrameAt(const CentreLine& line, double fraction, const Vec3d& facing)
 /// Distance along the ray to the first triangle through which it leaves the mesh (the outer side: the ray may begin in
 /// the lumen, within the wall or in a filled organ). Negative if there is none. Moeller and Trumbore's intersection.
 double ExitDistance(const TriangleMesh& mesh, const Vec3d& origin, const Vec3d& direction) {
-  double nearest = kRayLength_m;
+  double nearest = std::numeric_limits<double>::max();
   bool hit = false;
   for (const Triangle& t : mesh.triangles) {
     const Vec3d &a = mesh.vertices[t[0]], e1 = mesh.vertices[t[1]] - a, e2 = mesh.vertices[t[2]] - a;

@@ -191,6 +191,21 @@ TEST(Draping, BedContinuesBothRims) {
   EXPECT_FALSE(bed.triangles.empty());
 }
 
+/// A uterus with child, a distended stomach: thicker than a hand is wide.
+TEST(Draping, GoesOverAThickOrgan) {
+  const TriangleMesh organ = Capsule(31, 48, 0.085, 0.115);
+  MembraneSettings membrane;
+  membrane.rows = 41;
+  membrane.cols = 31;
+  membrane.gap_m = 0.005;
+  const CentreLine line({Vec3d(0, -0.19, 0), Vec3d(0, 0, 0), Vec3d(0, 0.19, 0)});
+  ImportSettings import;
+  import.from = 0.3;
+  import.to = 0.7;
+  const auto sheet = DrapeMembrane(import, membrane, line, Vec3d::UnitZ(), organ, "x");
+  EXPECT_NEAR(sheet[20 * 31 + 15].z(), 0.090, 0.002);
+}
+
 TEST(Draping, CentreLineOutsideTheOrganIsRefused) {
   const TriangleMesh organ = Capsule(31, 48, 0.012, 0.030);
   MembraneSettings membrane;
