@@ -26,6 +26,15 @@ double SiFactor(std::string_view key) {
   return unit ? unit->si : 1.0;
 }
 
+int FileOf(const Node& node) { return node.line / internal::kLinesPerFile; }
+
+/// Omits what comes from a farther base than `file`. True if nothing of the node remains.
+bool OmitBeyond(int file, Node* node) {
+  if (node->kind != NodeKind::kMap) return FileOf(*node) > file;
+  std::erase_if(node->entries, [&](const auto& entry) { return OmitBeyond(file, entry.second); });
+  return node->entries.empty() && FileOf(*node) > file;
+}
+
 }  // namespace
 
 bool StrictMap::Has(std::string_view key) const { return node_->Find(key) != nullptr; }
@@ -33,10 +42,27 @@ bool StrictMap::Has(std::string_view key) const { return node_->Find(key) != nul
 void StrictMap::KeepNearer(std::string_view one, std::string_view other) {
   const Node *a = node_->Find(one), *b = node_->Find(other);
   if (a == nullptr || b == nullptr) return;
-  const int a_file = a->line / internal::kLinesPerFile, b_file = b->line / internal::kLinesPerFile;
-  if (a_file == b_file) return;
-  const std::string_view farther = a_file > b_file ? one : other;
+  if (FileOf(*a) == FileOf(*b)) return;
+  const std::string_view farther = FileOf(*a) > FileOf(*b) ? one : other;
   std::erase_if(node_->entries, [&](const auto& entry) { return entry.first == farther; });
+}
+
+bool StrictMap::IsChanged(std::string_view key) const {
+  const Node* node = node_->Find(key);
+  return node != nullptr && node->replaced != nullptr && node->replaced->text != node->text;
+}
+
+void StrictMap::OmitFarther(std::string_view key, std::string_view than) {
+  const Node* nearer = node_->Find(than);
+  if (nearer == nullptr) return;
+  std::erase_if(node_->entries,
+                [&](const auto& entry) { return entry.first == key && OmitBeyond(FileOf(*nearer), entry.second); });
+}
+
+void StrictMap::Restate(std::string_view key, double value) {
+  for (Node::Asked& asked : node_->asked) {
+    if (asked.key == key) asked.text = Shortest(value);
+  }
 }
 
 std::vector<std::string> StrictMap::Keys() const {

@@ -88,4 +88,12 @@ std::string StrictYaml::Effective() const { return internal::EmitAsked(*document
 
 std::vector<KeyRule> StrictYaml::Rules() const { return internal::RulesOf(*document_->root); }
 
+std::vector<std::string> StrictYaml::Values() const {
+  std::vector<std::string> values;
+  for (const auto& node : document_->nodes) {
+    if (node->kind == NodeKind::kScalar) values.push_back(node->text);
+  }
+  return values;
+}
+
 }  // namespace fulcrum::config

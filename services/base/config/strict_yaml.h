@@ -118,6 +118,13 @@ class StrictMap {
   /// Of two keys that exclude each other, omits the one that comes from the farther base, so that a file can replace
   /// what its base chose. Without effect if both are in one file.
   void KeepNearer(std::string_view one, std::string_view other);
+  /// True if a word of the file replaces another one of its base.
+  [[nodiscard]] bool IsChanged(std::string_view key) const;
+  /// Omits a key, or those keys of a map, that come from a farther base than `than`: what a base says of something that
+  /// the file has replaced.
+  void OmitFarther(std::string_view key, std::string_view than);
+  /// A number that is given elsewhere, in the key's unit, in place of the one that was read: Effective() has it.
+  void Restate(std::string_view key, double value);
 
   /// For rules that span several keys: throws InputError at this key's line: "file:line: path: `reason`".
   [[noreturn]] void Fail(std::string_view key, std::string_view reason) const;
@@ -187,6 +194,8 @@ class StrictYaml {
   [[nodiscard]] std::string Effective() const;
   /// Every key that was read, in the order of reading; of the maps of a list the first stands for all.
   [[nodiscard]] std::vector<KeyRule> Rules() const;
+  /// Every value of the file that is no map or list, as text: for a search of what it names.
+  [[nodiscard]] std::vector<std::string> Values() const;
 
  private:
   explicit StrictYaml(std::unique_ptr<internal::Document> document);

@@ -229,6 +229,7 @@ void Join(Node* base, const Node& over) {
     } else if (known->second->kind == NodeKind::kMap && node->kind == NodeKind::kMap) {
       Join(known->second, *node);
     } else {
+      if (node->replaced == nullptr) node->replaced = known->second;
       known->second = node;
     }
   }

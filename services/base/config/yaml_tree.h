@@ -19,6 +19,7 @@ struct Node {
   std::string text;  ///< Value of a scalar.
   std::vector<Node*> items;
   std::vector<std::pair<std::string, Node*>> entries;
+  const Node* replaced = nullptr;  ///< Value that the nearest base with one has in this place.
 
   /// Form of an entry that was read. Entries are in order of reading; of text, list and maps exactly one is used.
   enum class Form { kPlain, kQuoted, kFlow, kQuotedList, kMap, kMaps, kAbsent };

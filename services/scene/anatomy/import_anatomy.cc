@@ -22,7 +22,7 @@
 #include "services/scene/compiler/new_scene.h"
 #include "services/scene/compiler/preview.h"
 #include "services/scene/compiler/print_text.h"
-#include "services/scene/compiler/scene_yaml.h"
+#include "services/scene/compiler/yaml_bodies.h"
 #include "services/scene/compiler/tetrahedralise.h"
 
 namespace fulcrum::scene {

@@ -54,7 +54,8 @@ inline constexpr int kMostTets = 1000000;
 struct FixedSettings {
   std::string name;
   SurfaceRole role = SurfaceRole::kOther;
-  std::filesystem::path file;  ///< In the unit and from the origin of `import`; empty: `shape`.
+  std::filesystem::path file;  ///< From the origin of `import`; empty: `shape`.
+  double scale_m = 0;          ///< Metres per unit of the file; 0: as of `import`.
   ShapeSettings shape;
   bool inside = false;             ///< Turned over: a closed surface is seen from inside.
   Vec3f offset_m = Vec3f::Zero();  ///< Displacement, as by the assistant's retraction.
@@ -107,7 +108,9 @@ struct Material {
 struct BodySettings {
   std::string name;
   Material material;
-  std::filesystem::path file;  ///< Surface or tetrahedra, in the unit and from the origin of `import`; empty: `shape`.
+  std::filesystem::path file;  ///< Surface or tetrahedra, from the origin of `import`; empty: `shape`.
+  double scale_m = 0;          ///< Metres per unit of the file; 0: as of `import`.
+  bool cap_openings = false;   ///< Close an open surface of the file with caps.
   Vec3f offset_m = Vec3f::Zero();
   ShapeSettings shape;
   bool is_tube = false;       ///< `shape` is swept and thin: hexagonal rings around its line.

@@ -14,6 +14,9 @@
 namespace fulcrum::scene {
 namespace {
 
+/// A surface outside these limits was not given in the unit that the description says: nobody would see or touch it.
+constexpr double kSmallestFixed_m = 0.001, kLargestFixed_m = 10;
+
 /// Vertices on one side of a body, over a share of its extent in that direction.
 std::vector<bool> HeldOn(const std::vector<Vec3d>& vertices, const Vec3d& side, double share) {
   double low = 0, high = 0;
@@ -44,7 +47,8 @@ SolidBody Build(const BodySettings& settings, const ImportSettings& like, const 
     std::fill_n(body.fixed.rbegin(), tube.ring_vertices, settings.last_end_held);
   } else {
     ImportSettings import;
-    import.scale_m = like.scale_m;
+    import.scale_m = settings.scale_m > 0 ? settings.scale_m : like.scale_m;
+    import.cap_openings = settings.cap_openings;
     import.origin_m = like.origin_m;
     import.organ_file = settings.file;
     import.shape = settings.shape;
@@ -142,10 +146,17 @@ void AddFixed(const std::vector<FixedSettings>& surfaces, const SceneSettings& s
   const ImportSettings like = settings.import.value_or(ImportSettings{});
   for (const FixedSettings& wanted : surfaces) {
     Named("fixed surface", wanted.name, [&] {
-      const bool is_shape = wanted.file.empty();
-      TriangleMesh mesh = is_shape ? SurfaceOfShape(wanted.shape) : SurfaceOf(ReadMesh(wanted.file));
-      // Shapes are in metres already.
-      ToMetres(is_shape ? 1 : like.scale_m, like.origin_m, wanted.offset_m, &mesh.vertices);
+      TriangleMesh mesh;
+      if (wanted.file.empty()) {  // Shapes are in metres already.
+        mesh = SurfaceOfShape(wanted.shape);
+        ToMetres(1, like.origin_m, wanted.offset_m, &mesh.vertices);
+      } else {
+        const double scale_m = wanted.scale_m > 0 ? wanted.scale_m : like.scale_m;
+        MeshFile file = ReadMesh(wanted.file);
+        ToMetres(scale_m, like.origin_m, wanted.offset_m, &file.vertices);
+        CheckSize(file, scale_m, wanted.name, kSmallestFixed_m, kLargestFixed_m);
+        mesh = SurfaceOf(std::move(file));
+      }
       for (Vec3d& p : mesh.vertices) p = placement.ToWorld(p);
       mesh = Decimate(mesh, wanted.triangles_max);
       if (wanted.inside) {

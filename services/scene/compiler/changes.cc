@@ -5,25 +5,15 @@
 #include <algorithm>
 #include <array>
 
+#include "services/base/config/strict_yaml.h"
 #include "services/base/core/error.h"
 
 namespace fulcrum::scene {
 namespace {
 
-constexpr std::string_view kPower = "script.power_W";
+constexpr std::string_view kPower = "script.power_W=";
 /// Keys of the script itself that can be changed.
 constexpr std::array<std::string_view, 2> kOfTheScript{"script.hand", "script.seed"};
-
-/// Sets the generator's power in every script key with a power above 0. Each key gets a value of its own: a shared one
-/// would be written as an anchor.
-void SetPower(YAML::Node description, const YAML::Node& value) {
-  for (auto entry : description["script"]) {
-    if (!entry.second.IsSequence()) continue;
-    for (YAML::Node key : entry.second) {
-      if (key["power_W"] && key["power_W"].as<double>(0) > 0) key["power_W"] = YAML::Clone(value);
-    }
-  }
-}
 
 std::string Names(std::span<const std::string_view> sections) {
   std::string names;
@@ -32,6 +22,14 @@ std::string Names(std::span<const std::string_view> sections) {
 }
 
 }  // namespace
+
+std::optional<double> PowerOfChange(const std::string& change) {
+  if (!change.starts_with(kPower)) return std::nullopt;
+  config::StrictYaml yaml = config::StrictYaml::FromText("power_W: " + change.substr(kPower.size()), "--set " + change);
+  const double power_W = yaml.root().NumberSi("power_W", config::Range::Between(0, 300));
+  yaml.Finish();
+  return power_W;
+}
 
 std::string ApplyChanges(const std::string& yaml, const std::vector<std::string>& changes,
                          std::span<const std::string_view> sections, std::string_view option) {
@@ -50,9 +48,7 @@ std::string ApplyChanges(const std::string& yaml, const std::vector<std::string>
       }
       const std::string key = change.substr(0, equals);
       if (section == "script" && std::ranges::find(kOfTheScript, key) == kOfTheScript.end()) {
-        if (key != kPower) throw InputError(what + ": of the script only power_W, hand and seed can be changed");
-        SetPower(description, YAML::Load(change.substr(equals + 1)));
-        continue;
+        throw InputError(what + ": of the script only power_W, hand and seed can be changed");
       }
       description[section][change.substr(dot + 1, equals - dot - 1)] = YAML::Load(change.substr(equals + 1));
     }

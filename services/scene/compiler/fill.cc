@@ -8,9 +8,9 @@
 #include "services/scene/compiler/mesh_repair.h"
 #include "services/scene/compiler/placement.h"
 #include "services/scene/compiler/say.h"
-#include "services/scene/compiler/scene_yaml.h"
 #include "services/scene/compiler/shapes.h"
 #include "services/scene/compiler/tet_repair.h"
+#include "services/scene/compiler/yaml_bodies.h"
 
 namespace fulcrum::scene {
 namespace {
@@ -21,30 +21,12 @@ constexpr int kLeastTets = 100;
 /// An organ outside these limits was not given in the unit that the description says.
 constexpr double kSmallestOrgan_m = 0.008, kLargestOrgan_m = 1.0;
 
-void CheckSize(const MeshFile& file, const ImportSettings& import, const std::string& name) {
-  const double size = LongestSide(file);
-  if (size >= kSmallestOrgan_m && size <= kLargestOrgan_m) return;
-  std::string advice = "give its `unit` or a `scale`";
-  for (const char* unit : {"m", "cm", "mm", "um"}) {
-    const double then = size / import.scale_m * LengthUnit(unit);
-    if (then >= kSmallestOrgan_m && then <= kLargestOrgan_m) {
-      char text[96];
-      std::snprintf(text, sizeof(text), "with `unit: %s` it would be %.3g mm long", unit, 1e3 * then);
-      advice = text;
-    }
-  }
-  char text[160];
-  std::snprintf(text, sizeof(text), ": the organ is %.3g mm long; valid: %g to %g mm. ", 1e3 * size,
-                1e3 * kSmallestOrgan_m, 1e3 * kLargestOrgan_m);
-  throw InputError(name + text + advice);
-}
-
 FilledBody TakeTetrahedra(const MeshFile& file, const ImportSettings& import, const std::string& name,
                           const Progress& progress) {
   if (import.wall_m > 0 || import.cap_openings) {
     throw InputError(name +
-                     ": wall_mm and cap_openings are for surfaces, but this file holds tetrahedra; with "
-                     "`remesh: true` its surface is taken");
+                     ": wall_mm and cap_openings are for surfaces, but this file holds tetrahedra: remove them, or in "
+                     "`organ.import` give `remesh: true`, which takes its surface");
   }
   TetRepairReport report;
   FilledBody organ{RepairTetrahedra(file, name, &report), {}};
@@ -117,6 +99,24 @@ FilledBody FillSurface(const TriangleMesh& read, const ImportSettings& import, c
 
 }  // namespace
 
+void CheckSize(const MeshFile& file, double scale_m, const std::string& name, double least_m, double most_m) {
+  const double size = LongestSide(file);
+  if (size >= least_m && size <= most_m) return;
+  std::string advice = "no unit fits: scale the file";
+  for (const char* unit : {"um", "cm", "m", "mm"}) {
+    const double then = size / scale_m * LengthUnit(unit);
+    if (then >= least_m && then <= most_m) {
+      char text[96];
+      std::snprintf(text, sizeof(text), "with `unit: %s` it would be %.3g mm long", unit, 1e3 * then);
+      advice = text;
+    }
+  }
+  char text[160];
+  std::snprintf(text, sizeof(text), ": it is %.3g mm long; valid: %g to %g mm. ", 1e3 * size, 1e3 * least_m,
+                1e3 * most_m);
+  throw InputError(name + text + advice);
+}
+
 void ToMetres(double scale_m, const Vec3f& origin_m, const Vec3f& offset_m, std::vector<Vec3d>* points) {
   for (Vec3d& p : *points) {
     p = scale_m * p - origin_m.cast<double>() + offset_m.cast<double>();
@@ -131,7 +131,7 @@ FilledBody FillBody(const ImportSettings& import, const std::string& name, const
   }
   MeshFile file = ReadMesh(import.organ_file);
   ToMetres(import.scale_m, import.origin_m, Vec3f::Zero(), &file.vertices);
-  CheckSize(file, import, name);
+  CheckSize(file, import.scale_m, name, kSmallestOrgan_m, kLargestOrgan_m);
   Say(progress, "%s: %zu vertices, %zu triangles, %zu tetrahedra, %zu points and lines left out", name.c_str(),
       file.vertices.size(), file.triangles.size(), file.tets.size(), file.skipped);
   if (!file.tets.empty() && !import.remesh) {

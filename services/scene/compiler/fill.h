@@ -18,6 +18,10 @@ struct FilledBody {
 /// InputError "name: reason".
 FilledBody FillBody(const ImportSettings& import, const std::string& name, const Progress& progress);
 
+/// Refuses what is shorter than `least_m` or longer than `most_m`, with the unit in which it would not be. `file` is in
+/// metres, by `scale_m` metres per unit. Throws InputError "name: reason".
+void CheckSize(const MeshFile& file, double scale_m, const std::string& name, double least_m, double most_m);
+
 /// From a file's unit and origin to metres.
 void ToMetres(double scale_m, const Vec3f& origin_m, const Vec3f& offset_m, std::vector<Vec3d>* points);
 

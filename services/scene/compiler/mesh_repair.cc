@@ -342,7 +342,7 @@ TriangleMesh RepairSurface(const TriangleMesh& mesh, const SurfaceRepair& settin
     const std::string openings = OpeningsOf(surface, &spot.place);
     spot.meshes = {ToMesh(&surface)};
     throw OpenSurfaceError(name + ": the surface is not closed (" + openings +
-                               "); `cap_openings: true` closes its holes, `wall_mm` makes it a wall",
+                               "); `cap_openings: true` closes its holes; in `organ.import`, `wall_mm` makes it a wall",
                            std::move(spot));
   }
   RemoveSlivers(settings.min_edge, &surface, report);

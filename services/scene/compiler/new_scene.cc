@@ -10,7 +10,7 @@
 #include "services/scene/compiler/mesh_repair.h"
 #include "services/scene/compiler/placement.h"
 #include "services/scene/compiler/print_text.h"
-#include "services/scene/compiler/scene_yaml.h"
+#include "services/scene/compiler/yaml_bodies.h"
 
 namespace fulcrum::scene {
 namespace {
@@ -222,6 +222,7 @@ std::string BodiesText(const NewScene& scene) {
         text.empty() ? "bodies:                          # each held on the side that faces away from the organ\n" : "";
     text +=
         "  - {name: " + n.surface.name + ", material: " + n.material + ", mesh: " + n.surface.file.filename().string() +
+        (n.cap_openings ? ", cap_openings: true" : "") +
         PrintText(", tet_edge_mm: %.1f, triangles_max: %d,\n     held_side: ", n.tet_edge_mm, n.surface.triangles_max) +
         TextOf(n.held_side) + "}\n";
   }

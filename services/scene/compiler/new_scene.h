@@ -15,7 +15,8 @@ namespace fulcrum::scene {
 /// Something beside the organ.
 struct NewNeighbour {
   FixedSettings surface;
-  std::string material;  ///< Of a deformable body; empty: it is fixed.
+  std::string material;       ///< Of a deformable body; empty: it is fixed.
+  bool cap_openings = false;  ///< Of a deformable body: its surface is open.
   double tet_edge_mm = 6;
   Vec3d held_side = Vec3d::UnitZ();  ///< In the frame of the file.
 };

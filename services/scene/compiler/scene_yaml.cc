@@ -42,7 +42,6 @@ const StrictMap::Choices<ProtectedKind> kProtectedKinds = {{"ureter", ProtectedK
 const StrictMap::Choices<std::uint32_t> kPedals = {
     {"up", kPedalNone}, {"cut", kPedalCut}, {"coag", kPedalCoag}, {"blend", kPedalBlend}};
 const StrictMap::Choices<BrickSplit> kSplits = {{"six", BrickSplit::kSix}, {"five", BrickSplit::kFive}};
-const StrictMap::Choices<double> kLengthUnits = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}, {"um", 1e-6}};
 
 void ReadTube(StrictMap map, TubeSettings* t) {
   ReadInteger(&map, "rings", 3, 1000, &t->rings);
@@ -110,11 +109,13 @@ void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Fol
   import->remesh = map.Flag("remesh", import->remesh);
   import->cap_openings = map.Flag("cap_openings", import->cap_openings);
   ReadSi(&map, "wall_mm", Range::Between(0, 30), &import->wall_m);
-  if (map.Has("tet_edge_mm") && map.Has("target_tets")) {
+  map.KeepNearer("tet_edge_mm", "target_tets");
+  ReadSi(&map, "tet_edge_mm", Range::Between(0, 50), &import->tet_edge_m);
+  if (import->tet_edge_m > 0 && map.Has("target_tets")) {
     map.Fail("tet_edge_mm", "and target_tets set the same quantity: give one of them");
   }
-  ReadInteger(&map, "target_tets", 500, kMostTets, &import->target_tets);
-  ReadSi(&map, "tet_edge_mm", Range::Between(0, 50), &import->tet_edge_m);
+  // Not beside an edge: the effective YAML would say both.
+  if (!(import->tet_edge_m > 0)) ReadInteger(&map, "target_tets", 500, kMostTets, &import->target_tets);
   ReadSi(&map, "min_edge_mm", Range::Between(0, 5), &import->min_edge_m);
   ReadInteger(&map, "organ_triangles_max", 500, 200000, &import->organ_triangles_max);
   map.KeepNearer("centreline", "patch");
@@ -144,6 +145,7 @@ void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Fol
   for (StrictMap& entry : map.Maps("surroundings", 0, kMostSurroundings)) {
     FixedSettings& s = import->surroundings.emplace_back(ReadFixedSurface(&entry));
     s.file = FindFile(entry, "file", entry.Text("file"), *folders);
+    s.scale_m = ReadFileUnit(&entry);
   }
 }
 
@@ -226,6 +228,12 @@ Vec3f TrocarFor(const RenderParams& render) {
 void ReadTool(StrictMap map, const Folders& folders, const RenderParams& render, ToolDescription* tool,
               ToolMeshSettings* meshes) {
   tool->kind = map.Choice("kind", tool->kind, kToolKinds);
+  if (map.IsChanged("kind")) {  // What a base says of another kind of tool is not meant for this one.
+    for (const std::string& key : map.Keys()) {
+      const bool is_of_kind = key == "meshes" || (key == "traction_N" && tool->kind != ToolKind::kGrasper);
+      if (tool->kind == ToolKind::kNone || is_of_kind) map.OmitFarther(key, "kind");
+    }
+  }
   if (tool->kind == ToolKind::kNone) {
     return;
   }
@@ -242,8 +250,9 @@ void ReadTool(StrictMap map, const Folders& folders, const RenderParams& render,
   }
 }
 
-/// `sheets`: names of those of the scene, the first one first.
-ScriptKeySettings ReadKey(StrictMap map, double duration_s, ToolKind kind, const std::vector<std::string>& sheets) {
+/// `sheets`: names of those of the scene, the first one first. `power_W`: in place of each power above 0.
+ScriptKeySettings ReadKey(StrictMap map, double duration_s, ToolKind kind, const std::vector<std::string>& sheets,
+                          std::optional<double> power_W) {
   constexpr double kShut_rad = 0.87;  // 50 degrees: of a tube's handle that is let go.
   ScriptKeySettings key;
   if (kind == ToolKind::kSuction) key.jaw_rad = kShut_rad;
@@ -273,13 +282,17 @@ ScriptKeySettings ReadKey(StrictMap map, double duration_s, ToolKind kind, const
   ReadSi(&map, "roll_deg", Range::Between(-180, 180), &key.roll_rad);
   key.pedals = map.Choice("pedal", key.pedals, kPedals);
   ReadSi(&map, "power_W", Range::Between(0, 300), &key.power_W);
+  if (power_W && key.power_W > 0) {
+    key.power_W = *power_W;
+    map.Restate("power_W", *power_W);
+  }
   if (key.pedals != kPedalNone && !(key.power_W > 0)) {
     map.Fail("pedal", "is down, but power_W is 0");
   }
   return key;
 }
 
-void ReadScript(StrictMap map, SceneSettings* scene) {
+void ReadScript(StrictMap map, std::optional<double> power_W, SceneSettings* scene) {
   std::vector<std::string> sheets;
   if (scene->has_organ) sheets.emplace_back("membrane");
   for (const SheetSettings& sheet : scene->sheets) sheets.push_back(sheet.name);
@@ -295,7 +308,7 @@ void ReadScript(StrictMap map, SceneSettings* scene) {
     const std::string name = "tool" + std::to_string(tool);
     double last_s = -1;
     for (StrictMap& entry : map.Maps(name, 0, kMaxKeys)) {
-      ScriptKeySettings key = ReadKey(entry, scene->script_duration_s, scene->tools[tool].kind, sheets);
+      ScriptKeySettings key = ReadKey(entry, scene->script_duration_s, scene->tools[tool].kind, sheets, power_W);
       key.tool = tool;
       if (scene->tools[tool].kind == ToolKind::kNone) {
         entry.Fail("time_s", "the scene has no " + name);
@@ -306,6 +319,9 @@ void ReadScript(StrictMap map, SceneSettings* scene) {
       last_s = key.time_s;
       scene->script.push_back(key);
     }
+  }
+  if (power_W && std::ranges::none_of(scene->script, [](const auto& key) { return key.power_W > 0; })) {
+    throw InputError("--set script.power_W: the scene's script has no use of the generator");
   }
 }
 
@@ -332,8 +348,9 @@ std::uint32_t ReadNodes(StrictMap* root, std::uint32_t all) {
 }
 
 /// @param bases folders to which relative names of the description refer.
+/// @param power_W replaces the power of each use in the script, whichever file says it.
 SceneDescription Read(StrictYaml* yaml, const Folders& bases, const MaterialLibrary& materials,
-                      const std::filesystem::path& data) {
+                      const std::filesystem::path& data, std::optional<double> power_W = {}) {
   SceneSettings scene;
   StrictMap root = yaml->root();
   scene.name = root.Text("name", 63);
@@ -379,7 +396,7 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const MaterialLibr
   ReadBreathing(root.MapOrDefaults("breathing"), scene.physics.mode, &scene.breathing);
   ReadThermal(root.MapOrDefaults("thermal"), &scene.thermal);
   ReadHaptics(root.MapOrDefaults("haptics"), &scene.haptics);
-  ReadScript(root.MapOrDefaults("script"), &scene);
+  ReadScript(root.MapOrDefaults("script"), power_W, &scene);
   if (auto assessment = root.OptionalMap("assessment")) {
     ReadAssessment(*assessment, &scene.assessment, &scene.planned_line);
     if (!has_sheets && !scene.planned_line.empty()) {
@@ -400,10 +417,19 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const MaterialLibr
 SceneDescription ReadFile(const std::filesystem::path& file, const std::filesystem::path& data,
                           const std::vector<std::string>& changes, bool files_needed) {
   std::string changed;
-  if (!changes.empty()) {
+  std::optional<double> power_W;
+  std::vector<std::string> others;
+  for (const std::string& change : changes) {
+    if (const auto power = PowerOfChange(change)) {
+      power_W = power;
+    } else {
+      others.push_back(change);
+    }
+  }
+  if (!others.empty()) {
     std::ifstream stream(file, std::ios::binary);
     const std::string text{std::istreambuf_iterator<char>(stream), {}};
-    changed = ApplyChanges(text, changes, kCompileSections);
+    changed = ApplyChanges(text, others, kCompileSections);
   }
   // A scene with the name of its base would be mistaken for it.
   StrictYaml yaml =
@@ -413,7 +439,7 @@ SceneDescription ReadFile(const std::filesystem::path& file, const std::filesyst
   for (const auto& from : yaml.files()) {
     if (std::find(bases.begin(), bases.end(), from.parent_path()) == bases.end()) bases.push_back(from.parent_path());
   }
-  return Read(&yaml, bases, MaterialLibrary(bases), data);
+  return Read(&yaml, bases, MaterialLibrary(bases), data, power_W);
 }
 
 }  // namespace
@@ -428,34 +454,15 @@ bool IsSceneName(std::string_view name) {
   return !name.empty() && name.size() <= 63 && std::all_of(name.begin(), name.end(), is_plain) && name[0] != '.';
 }
 
-std::string_view RoleName(SurfaceRole role) {
-  return std::find_if(kSurfaceRoles.begin(), kSurfaceRoles.end(), [&](const auto& r) { return r.second == role; })
-      ->first;
-}
-
-SurfaceRole RoleNamed(const std::string& name) {
-  std::string valid;
-  for (const auto& [word, role] : kSurfaceRoles) {
-    if (word == name) return role;
-    valid += (valid.empty() ? "" : ", ") + std::string(word);
-  }
-  throw InputError("role '" + name + "'; valid: " + valid);
-}
-
-double LengthUnit(const std::string& name) {
-  for (const auto& [unit, metres] : kLengthUnits) {
-    if (unit == name) return metres;
-  }
-  throw InputError("unit '" + name + "'; valid: m, cm, mm, um");
-}
-
 std::vector<config::KeyRule> SceneRules(const std::filesystem::path& file) {
   return ReadFile(file, {}, {}, false).rules;
 }
 
-SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, const std::filesystem::path& data) {
+SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, const std::filesystem::path& data,
+                                MeshFiles files) {
   StrictYaml yaml = StrictYaml::FromText(text, name);
   Folders here;
+  here.files_needed = files == MeshFiles::kNeeded;
   here.emplace_back();
   return Read(&yaml, here, MaterialLibrary({}, MaterialLibrary::Files::kReplaced), data);
 }

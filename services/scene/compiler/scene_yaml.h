@@ -22,21 +22,17 @@ struct SceneDescription {
 SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data,
                                const std::vector<std::string>& changes = {});
 
+/// Whether the mesh files that a description names must exist.
+enum class MeshFiles { kNeeded, kNotRead };
+
 /// As ReadSceneYaml, for a text; `name` stands for the file in messages, relative folders refer to the working
 /// directory.
-SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, const std::filesystem::path& data);
+SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, const std::filesystem::path& data,
+                                MeshFiles files = MeshFiles::kNeeded);
 
 /// True if a scene may have this name, which becomes a part of the names of files and folders.
 [[nodiscard]] bool IsSceneName(std::string_view name);
 inline constexpr const char* kSceneNameRule = "up to 63 letters, digits, '-', '_' and '.', the first no '.'";
-
-/// The word for a role in a description.
-std::string_view RoleName(SurfaceRole role);
-/// The role that a word names. Throws InputError.
-SurfaceRole RoleNamed(const std::string& name);
-
-/// Metres per unit m, cm, mm or um. Throws InputError for another one.
-double LengthUnit(const std::string& name);
 
 /// Every key that a description can have. Its mesh files need not exist.
 std::vector<config::KeyRule> SceneRules(const std::filesystem::path& file);

@@ -67,7 +67,11 @@ BodySettings ReadBody(StrictMap map, const FindMesh& find, const MaterialLibrary
   if (sources == 0) map.Fail("name", "needs one of `mesh`, `shape` and `tube`");
   if (sources > 1)
     map.Fail(map.Has("tube") ? "tube" : "shape", "is one too many: give one of `mesh`, `shape` and `tube`");
-  if (map.Has("mesh")) body.file = find(map, "mesh");
+  if (map.Has("mesh")) {
+    body.file = find(map, "mesh");
+    body.scale_m = ReadFileUnit(&map);
+    body.cap_openings = map.Flag("cap_openings", body.cap_openings);
+  }
   if (auto shape = map.OptionalMap("shape")) body.shape = ReadShape(*shape);
   if (auto tube = map.OptionalMap("tube")) {
     body.is_tube = true;
@@ -275,6 +279,33 @@ std::vector<Vec3f> ReadLine(StrictMap* map) {
   return points;
 }
 
+std::string_view RoleName(SurfaceRole role) {
+  return std::find_if(kSurfaceRoles.begin(), kSurfaceRoles.end(), [&](const auto& r) { return r.second == role; })
+      ->first;
+}
+
+SurfaceRole RoleNamed(const std::string& name) {
+  std::string valid;
+  for (const auto& [word, role] : kSurfaceRoles) {
+    if (word == name) return role;
+    valid += (valid.empty() ? "" : ", ") + std::string(word);
+  }
+  throw InputError("role '" + name + "'; valid: " + valid);
+}
+
+double LengthUnit(const std::string& name) {
+  for (const auto& [unit, metres] : kLengthUnits) {
+    if (unit == name) return metres;
+  }
+  throw InputError("unit '" + name + "'; valid: m, cm, mm, um");
+}
+
+double ReadFileUnit(StrictMap* map) {
+  StrictMap::Choices<double> units{{"import", 0.0}};
+  units.insert(units.end(), kLengthUnits.begin(), kLengthUnits.end());
+  return map->Choice("unit", 0.0, units);
+}
+
 ShapeSettings ReadShape(StrictMap map) {
   ShapeSettings shape;
   if (!map.Has("ellipsoid_mm")) {
@@ -326,7 +357,10 @@ std::vector<StrictMap> ReadBodies(StrictMap* root, const FindMesh& find, const M
   for (StrictMap& entry : root->Maps("fixed", 0, kMostSurroundings)) {
     FixedSettings& surface = scene->fixed.emplace_back(ReadFixedSurface(&entry));
     if (entry.Has("mesh") == entry.Has("shape")) entry.Fail("name", "needs either `mesh` or `shape`");
-    if (entry.Has("mesh")) surface.file = find(entry, "mesh");
+    if (entry.Has("mesh")) {
+      surface.file = find(entry, "mesh");
+      surface.scale_m = ReadFileUnit(&entry);
+    }
     if (auto shape = entry.OptionalMap("shape")) surface.shape = ReadShape(*shape);
     surface.inside = entry.Flag("inside", surface.inside);
     if (surface.name == "membrane" || surface.name == "cavity") {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "services/base/config/strict_yaml.h"
@@ -26,6 +27,19 @@ inline const config::StrictMap::Choices<SurfaceRole> kSurfaceRoles = {
     {"pelvis", SurfaceRole::kPelvis},
     {"bladder", SurfaceRole::kBladder},
     {"other", SurfaceRole::kOther}};
+
+/// Metres per unit of a mesh file.
+inline const config::StrictMap::Choices<double> kLengthUnits = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}, {"um", 1e-6}};
+
+/// `unit` of a mesh file beside the organ [metres per unit]; 0: that of `import`.
+double ReadFileUnit(config::StrictMap* map);
+
+/// The word for a role in a description.
+std::string_view RoleName(SurfaceRole role);
+/// The role that a word names. Throws InputError.
+SurfaceRole RoleNamed(const std::string& name);
+/// Metres per unit m, cm, mm or um. Throws InputError for another one.
+double LengthUnit(const std::string& name);
 
 /// Path of the file that a key names.
 using FindMesh = std::function<std::filesystem::path(const config::StrictMap&, const std::string& key)>;

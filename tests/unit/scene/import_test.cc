@@ -249,10 +249,45 @@ TEST_F(Import, TheSameTwice) {
 TEST_F(Import, AWrongUnitIsRefusedWithTheRightOne) {
   Write("ball.obj", Ball({0, 0, 0}, 0.03), 1);
   const std::string refusal = Refusal("    organ: ball.obj\n");
-  EXPECT_NE(refusal.find("the organ is 0.06 mm long; valid: 8 to 1000 mm. with `unit: m`"), std::string::npos)
+  EXPECT_NE(refusal.find("it is 0.06 mm long; valid: 8 to 1000 mm. with `unit: m` it would be 60 mm long"),
+            std::string::npos)
       << refusal;
   ExpectSound(Build("    organ: ball.obj\n    unit: m\n").View());
   ExpectSound(Build("    organ: ball.obj\n    scale: 1000\n").View());
+}
+
+/// What a refusal advises is a key that the body has.
+TEST_F(Import, ABodyHasAUnitOfItsOwnAndIsCapped) {
+  Write("ball.obj", Ball({0, 0, 0}, 0.03), 1e3);
+  TriangleMesh open = Ball({0.07, 0, 0}, 0.02);
+  open.triangles.resize(open.triangles.size() - 32);  // One pole.
+  Write("open.obj", open, 1);
+  const auto with = [](const std::string& keys) {
+    return "    organ: ball.obj\n    patch: {}\nbodies: [{name: lump, material: liver, mesh: open.obj, tet_edge_mm: 8" +
+           keys + "}]\nphysics: {mode: accurate}\n";
+  };
+  EXPECT_NE(Refusal(with("")).find("with `unit: m` it would be 40 mm long"), std::string::npos) << Refusal(with(""));
+  EXPECT_NE(Refusal(with(", unit: m")).find("lump: the surface is not closed"), std::string::npos);
+  EXPECT_NE(Refusal(with(", unit: m")).find("`cap_openings: true` closes its holes"), std::string::npos);
+  const SceneData data = Build(with(", unit: m, cap_openings: true"));
+  EXPECT_FALSE(FindFault(data.View()));
+  ASSERT_EQ(data.solids.size(), 2u);
+}
+
+TEST_F(Import, AFixedSurfaceThatNobodyWouldSeeIsRefused) {
+  Write("ball.obj", Ball({0, 0, 0}, 0.03), 1e3);
+  Write("wall.obj", Ball({0, 0, -0.08}, 0.025), 1);
+  const std::string organ = "    organ: ball.obj\n    patch: {}\n";
+  const std::string fixed = "fixed: [{name: wall, mesh: wall.obj, collides: true";
+  const std::string around = "    surroundings: [{name: wall, file: wall.obj";
+  for (const std::string& keys : {organ + fixed, organ + around}) {
+    const std::string refusal = Refusal(keys + "}]\n");
+    EXPECT_NE(refusal.find("wall: it is 0.05 mm long; valid: 1 to 10000 mm. with `unit: m` it would be 50 mm long"),
+              std::string::npos)
+        << refusal;
+    const SceneData data = Build(keys + ", unit: m}]\n");
+    EXPECT_EQ(std::string(data.static_surfaces.back().name), "wall");
+  }
 }
 
 TEST_F(Import, APatchBesideTheOrganIsRefusedWithAPicture) {
