@@ -54,7 +54,8 @@ std::uint64_t DrawPictures(const Options& options, const SceneView& scene, const
 ExitCode CompareWithChanges(const Options& options, const LockStepSettings& settings, const scene::SceneFile& scene,
                             const config::CartConfig& cart, const ProgressLine& progress,
                             const std::function<void(double)>& told) {
-  const SceneView changed = WithChanges(scene, options.changes);
+  std::vector<Solid> solids;
+  const SceneView changed = WithChanges(scene, options.changes, &solids);
   const WhatIfResult result = ReplayWhatIf(settings, scene.view(), changed, cart, told);
   progress.Clear();
   std::cout << ReportText(result, settings.nodes);

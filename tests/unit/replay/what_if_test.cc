@@ -10,6 +10,7 @@
 #include "services/apps/replayer/changed_scene.h"
 #include "services/apps/replayer/what_if_report.h"
 #include "services/base/core/error.h"
+#include "services/base/core/solids.h"
 #include "services/scene/compiler/compile.h"
 #include "services/scene/compiler/scene_yaml.h"
 #include "services/scene/format/scene_file.h"
@@ -38,7 +39,8 @@ class WhatIfTest : public ::testing::Test {
   static WhatIfResult WhatIf(const std::vector<std::string>& changes, const std::vector<NodeId>& nodes) {
     const LockStepSettings settings{folder_ / "recording.mcap", nodes, folder_ / "again", 0, 1, -1};
     std::filesystem::remove_all(settings.folder);
-    return ReplayWhatIf(settings, scene_->view(), WithChanges(*scene_, changes), {}, {});
+    std::vector<Solid> solids;
+    return ReplayWhatIf(settings, scene_->view(), WithChanges(*scene_, changes, &solids), {}, {});
   }
 
   static std::filesystem::path folder_;
@@ -87,10 +89,28 @@ TEST_F(WhatIfTest, BelowTheVoltageOfDischargesHardlyAnythingIsCut) {
   EXPECT_EQ(result.frames, 0u) << "nothing but thermal was replayed";
 }
 
+TEST_F(WhatIfTest, TheOrgansModulusIsChangedAlsoBesideOtherBodies) {
+  const auto description = scene::ParseSceneYaml(
+      "name: two\nphysics: {mode: accurate}\norgan: {procedural: {rings: 22, segments: 10, length_mm: 100}}\n"
+      "membrane: {rows: 41, cols: 22}\nbodies: [{name: lobe, material: liver, shape: {ellipsoid_mm: [15, 20, 10], "
+      "at_mm: [0, 0, 60]}, tet_edge_mm: 8}]\n",
+      "two.yaml", {});
+  scene::WriteSceneFile(scene::BuildScene(description.settings, {}), description.effective_yaml, folder_ / "two");
+  const scene::SceneFile two(folder_ / "two");
+  std::vector<Solid> solids;
+  const SceneView same = WithChanges(two, {}, &solids);
+  EXPECT_EQ(YoungsModulusOf(same, 0), YoungsModulusOf(two.view(), 0));
+  const SceneView changed = WithChanges(two, {"physics.tube_youngs_modulus_kPa=2"}, &solids);
+  EXPECT_EQ(YoungsModulusOf(changed, 0), 2000.0f);
+  EXPECT_EQ(YoungsModulusOf(changed, 1), YoungsModulusOf(two.view(), 1));
+  EXPECT_EQ(changed.hash, two.view().hash);
+}
+
 TEST_F(WhatIfTest, BadChangesAreNamed) {
   const auto refusal = [](const std::string& change) {
     try {
-      (void)WithChanges(*scene_, {change});
+      std::vector<Solid> solids;
+      (void)WithChanges(*scene_, {change}, &solids);
     } catch (const InputError& error) {
       return std::string(error.what());
     }
