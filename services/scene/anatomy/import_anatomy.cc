@@ -7,7 +7,6 @@
 #include <functional>
 #include <map>
 #include <numbers>
-#include <numeric>
 #include <optional>
 #include <set>
 
@@ -15,6 +14,7 @@
 #include "services/base/core/error.h"
 #include "services/base/core/escape.h"
 #include "services/scene/anatomy/dicom_segmentation.h"
+#include "services/scene/anatomy/organ_surface.h"
 #include "services/scene/anatomy/surface_nets.h"
 #include "services/scene/builder/geometry.h"
 #include "services/scene/compiler/materials.h"
@@ -22,8 +22,8 @@
 #include "services/scene/compiler/new_scene.h"
 #include "services/scene/compiler/preview.h"
 #include "services/scene/compiler/print_text.h"
-#include "services/scene/compiler/yaml_bodies.h"
 #include "services/scene/compiler/tetrahedralise.h"
+#include "services/scene/compiler/yaml_bodies.h"
 
 namespace fulcrum::scene {
 namespace {
@@ -43,39 +43,6 @@ void WriteText(const fs::path& file, const std::string& text) {
   if (!out.write(text.data(), static_cast<std::streamsize>(text.size())).flush()) {
     throw InputError(file.string() + ": cannot be written");
   }
-}
-
-/// Binary little-endian PLY, which keeps shared vertices.
-std::string Ply(const TriangleMesh& mesh) {
-  std::string bytes =
-      "ply\nformat binary_little_endian 1.0\ncomment millimetres; x left, y cranial, z anterior\n"
-      "element vertex " +
-      std::to_string(mesh.vertices.size()) + "\nproperty float x\nproperty float y\nproperty float z\nelement face " +
-      std::to_string(mesh.triangles.size()) + "\nproperty list uchar int vertex_indices\nend_header\n";
-  const auto put = [&](const auto& value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof(value)); };
-  for (const Vec3d& p : mesh.vertices) {
-    for (int k = 0; k < 3; ++k) put(static_cast<float>(p[k]));
-  }
-  for (const Triangle& t : mesh.triangles) {
-    put(std::uint8_t{3});
-    for (const Index v : t) put(static_cast<std::int32_t>(v));
-  }
-  return bytes;
-}
-
-int PiecesOf(const TriangleMesh& mesh) {
-  std::vector<Index> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](Index v) {
-    while (parent[v] != v) v = parent[v] = parent[parent[v]];
-    return v;
-  };
-  for (const Triangle& t : mesh.triangles) {
-    for (std::size_t k = 1; k < 3; ++k) parent[root(t[k])] = root(t[0]);
-  }
-  std::set<Index> roots;
-  for (const Triangle& t : mesh.triangles) roots.insert(root(t[0]));
-  return static_cast<int>(roots.size());
 }
 
 const Segment* SegmentOf(const LabelMap& map, int label) {
@@ -200,19 +167,6 @@ std::map<std::string, TriangleMesh> SurfacesOfFiles(const AnatomyImport& import,
   return surfaces;
 }
 
-Vec3d MiddleOf(const TriangleMesh& mesh) {
-  Vec3d sum = Vec3d::Zero();
-  for (const Vec3d& p : mesh.vertices) sum += p;
-  return sum / static_cast<double>(std::max<std::size_t>(mesh.vertices.size(), 1));
-}
-
-/// Some vertex of one is nearer to a triangle of the other.
-bool AreNear(const TriangleMesh& one, const TriangleMesh& other, double reach) {
-  const TriangleLocator locator(other.vertices, other.triangles);
-  return std::ranges::any_of(one.vertices,
-                             [&](const Vec3d& p) { return locator.Closest(p, reach).triangle != kNoIndex; });
-}
-
 const LabelUse& OrganOf(const std::vector<LabelUse>& uses) {
   return *std::find_if(uses.begin(), uses.end(), [](const LabelUse& u) { return u.is_organ; });
 }
@@ -232,7 +186,8 @@ void DescribeBodies(const std::vector<LabelUse>& uses, const std::map<std::strin
     NewNeighbour& n = *deformable[i];
     const TriangleMesh& mesh = surfaces.at(n.surface.name);
     // A regular tetrahedron has edge^3 / (6 sqrt 2).
-    n.tet_edge_mm = std::clamp(std::cbrt(6 * std::numbers::sqrt2 * EnclosedVolume(mesh) / tets), 0.5, 50.0);
+    n.cap_openings = IsOpen(mesh);
+    n.tet_edge_mm = std::clamp(std::cbrt(6 * std::numbers::sqrt2 * std::abs(VolumeOf(mesh)) / tets), 0.5, 50.0);
     const Vec3d away = MiddleOf(mesh) - MiddleOf(organ);
     if (away.norm() > 0) n.held_side = away.normalized();
     // The surface of the tetrahedra is up to a quarter of their edge off.
@@ -393,6 +348,33 @@ std::string SuggestLabelUses(const fs::path& labels) {
   return text;
 }
 
+namespace {
+
+/// Removes what an import that fails has written, else the corrected command would find it there already.
+class OutFolder {
+ public:
+  explicit OutFolder(fs::path folder) : folder_(std::move(folder)) {
+    std::error_code error;
+    is_new_ = fs::create_directories(folder_, error);
+    if (error) throw InputError(folder_.string() + ": cannot be made (" + error.message() + ")");
+  }
+  ~OutFolder() {
+    if (is_done_) return;
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(folder_, error)) fs::remove(entry.path(), error);
+    if (is_new_) fs::remove(folder_, error);
+  }
+  OutFolder(const OutFolder&) = delete;
+  OutFolder& operator=(const OutFolder&) = delete;
+  void Keep() { is_done_ = true; }
+
+ private:
+  fs::path folder_;
+  bool is_new_ = false, is_done_ = false;
+};
+
+}  // namespace
+
 std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const Progress& progress) {
   const auto say = [&](const std::string& text) {
     if (progress) progress(text);
@@ -408,8 +390,7 @@ std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const P
   std::map<int, std::size_t> counts;
   std::map<std::string, TriangleMesh> surfaces =
       has_voxels ? SurfacesOfLabels(import, uses, say, &map, &counts) : SurfacesOfFiles(import, read, say);
-  fs::create_directories(import.out, error);
-  if (error) throw InputError(import.out.string() + ": cannot be made (" + error.message() + ")");
+  OutFolder out(import.out);
 
   const double voxel_ml = 1e-3 * std::abs(map.W_from_index.linear().determinant());
   std::vector<LabelReport> reports;
@@ -421,7 +402,8 @@ std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const P
     LabelReport report{use, has_voxels ? counts.at(use.label) : 0, 0, PiecesOf(surface), 0, 0};
     report.voxel_volume_ml = static_cast<double>(report.voxels) * voxel_ml;
     surface = Decimate(surface, use.is_organ ? kOrganTriangles : use.triangles_max);
-    report.volume_ml = 1e-3 * EnclosedVolume(surface);
+    if (!has_voxels && TurnOutward(&surface)) say(use.file + ": is inside out and turned");
+    report.volume_ml = 1e-3 * VolumeOf(surface);
     report.triangles = surface.triangles.size();
     const std::string file = use.name + ".ply";
     WriteText(import.out / file, Ply(surface));
@@ -446,6 +428,7 @@ std::vector<LabelReport> ImportAnatomyFiles(const AnatomyImport& import, const P
   const CompiledScene compiled = CompileScene(yaml, {}, progress);
   WriteText(import.out / (import.name + ".png"), PreviewOf(compiled.data.View()));
   WriteText(import.out / "report.html", Page(import, map, reports));
+  out.Keep();
   say("wrote " + import.out.string());
   return reports;
 }

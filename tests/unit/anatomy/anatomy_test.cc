@@ -300,7 +300,7 @@ TEST_F(Segmentation, AFolderOfSurfacesBecomesAScene) {
   const fs::path out = folder_ / "patient";
   const AnatomyImport import{"patient", folder_ / "surfaces", folder_ / "labels.yaml", out};
   EXPECT_NE(Refusal([&] { (void)ImportAnatomyFiles(import, {}); }).find("with `unit: m`"), std::string::npos);
-  fs::remove_all(out);
+  EXPECT_FALSE(fs::exists(out)) << "else the corrected command would be refused";
   std::string metres = suggested;
   metres.replace(metres.find("unit: mm"), 8, "unit: m ");
   std::ofstream(folder_ / "labels.yaml") << metres;
@@ -311,6 +311,51 @@ TEST_F(Segmentation, AFolderOfSurfacesBecomesAScene) {
   for (const Vec3d& p : ball.vertices) middle += p / static_cast<double>(ball.vertices.size());
   EXPECT_LT((middle - Vec3d(30, 10, 0)).norm(), 1) << "left stays left";
   EXPECT_TRUE(fs::exists(out / "report.html"));
+}
+
+/// As programs write what they have mirrored; one of them open.
+TEST_F(Segmentation, ASurfaceThatIsInsideOutIsTurned) {
+  const auto label = [](const Vec3d& p) {
+    if (std::hypot(p.x(), p.z()) < 15 && std::abs(p.y()) < 50) return 1;
+    if ((p - Vec3d(28, 10, 0)).norm() < 13) return 2;
+    if ((p - Vec3d(-28, 10, 0)).norm() < 13) return 4;
+    return (p - Vec3d(28, -25, 0)).norm() < 12 ? 3 : 0;
+  };
+  Eigen::Affine3d W = Eigen::Affine3d::Identity();
+  W.linear() *= 2;
+  W.translation().setConstant(-64);
+  const auto surfaces = SurfacesOf(Fill({64, 64, 64}, W, label), {1, 2, 3, 4});
+  fs::create_directories(folder_ / "surfaces");
+  for (const auto& [number, mesh] : surfaces) {
+    std::ofstream obj(folder_ / "surfaces" / (std::to_string(number) + ".obj"));
+    for (const Vec3d& p : mesh.vertices) obj << "v " << p.x() << " " << p.y() << " " << p.z() << "\n";
+    for (std::size_t i = number == 4 ? 30 : 0; i < mesh.triangles.size(); ++i) {
+      const Triangle& t = mesh.triangles[i];
+      obj << "f " << t[0] + 1 << " " << t[2] + 1 << " " << t[1] + 1 << "\n";
+    }
+  }
+  std::ofstream(folder_ / "labels.yaml")
+      << "axes: LSA\nlabels:\n  - {file: 1.obj, name: rectum, organ: true}\n"
+         "  - {file: 2.obj, name: ovary, material: liver}\n  - {file: 3.obj, name: bone}\n"
+         "  - {file: 4.obj, name: lump, material: fat}\n";
+  const fs::path out = folder_ / "patient";
+  std::string said;
+  const auto reports = ImportAnatomyFiles({"patient", folder_ / "surfaces", folder_ / "labels.yaml", out},
+                                          [&](const std::string& text) { said += text + "\n"; });
+  ASSERT_EQ(reports.size(), 4u);
+  EXPECT_NE(said.find("3.obj: is inside out and turned"), std::string::npos) << said;
+  for (const LabelReport& report : reports) {
+    double volume = 0;
+    const MeshFile mesh = ReadMesh(out / (report.use.name + ".ply"));
+    for (const Triangle& t : mesh.triangles) {
+      volume += mesh.vertices[t[0]].dot(mesh.vertices[t[1]].cross(mesh.vertices[t[2]])) / 6;
+    }
+    EXPECT_GT(report.volume_ml, 5) << report.use.name;
+    if (report.use.name == "lump") continue;  // Open: the volume depends on the origin.
+    EXPECT_NEAR(1e-3 * volume, report.volume_ml, 0.01) << report.use.name;
+  }
+  const SceneData data = CompileScene(out / "patient.yaml", {}, {}).data;
+  ASSERT_EQ(data.solids.size(), 3u) << "the open one is capped";
 }
 
 }  // namespace
