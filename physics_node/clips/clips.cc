@@ -1,6 +1,10 @@
 #include "physics_node/clips/clips.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
+#include <span>
 #include <utility>
 
 #include "physics_node/clips/rigid_fit.h"
@@ -32,6 +36,31 @@ float FromMiddleLineSq(const Vec3f& p_T, float length) {
   return (p_T - Vec3f(0, 0, std::clamp(p_T.z(), -length, 0.0f))).squaredNorm();
 }
 
+/// Of the particles the two that are farthest apart, and the one farthest from their line. None if all are near a line.
+std::optional<std::array<Index, 3>> WidestTriangle(std::span<const Index> tissue, const ParticleStore& particles) {
+  const auto at = [&](Index particle) { return particles.At(particles.Ref(particle)); };
+  std::array<Index, 3> corners{};
+  float farthest_sq = 0, largest_sq = 0;
+  for (std::size_t i = 0; i < tissue.size(); ++i) {
+    for (std::size_t j = i + 1; j < tissue.size(); ++j) {
+      if (const float sq = (at(tissue[j]) - at(tissue[i])).squaredNorm(); sq > farthest_sq) {
+        farthest_sq = sq;
+        corners = {tissue[i], tissue[j], 0};
+      }
+    }
+  }
+  if (!(farthest_sq > 0.0f)) return std::nullopt;
+  const Vec3f a = at(corners[0]), b = at(corners[1]);
+  for (const Index particle : tissue) {
+    if (const float sq = (b - a).cross(at(particle) - a).squaredNorm(); sq > largest_sq) {
+      largest_sq = sq;
+      corners[2] = particle;
+    }
+  }
+  if (!(largest_sq > kLeastWidth_m * kLeastWidth_m * farthest_sq)) return std::nullopt;
+  return corners;
+}
+
 }  // namespace
 
 Clips::Clips(const TissueScene& scene)
@@ -48,28 +77,18 @@ bool Clips::IsClipped(Index particle) const {
 }
 
 bool Clips::Anchor(const ClipPose& pose, const ParticleStore& particles, AppliedClip* clip) {
-  const auto at = [&](std::size_t i) { return particles.At(particles.Ref(clip->tissue[i].particle)); };
-  const std::size_t count = clip->tissue.size();
-  std::array<std::size_t, 3> anchors{};
-  float farthest_sq = 0, largest_sq = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t j = i + 1; j < count; ++j) {
-      if (const float sq = (at(j) - at(i)).squaredNorm(); sq > farthest_sq) {
-        farthest_sq = sq;
-        anchors = {i, j, 0};
-      }
-    }
+  std::vector<Index> all, of_sheets;
+  for (const ClippedParticle& clipped : clip->tissue) {
+    all.push_back(clipped.particle);
+    if (clipped.particle >= particles.tube_count()) of_sheets.push_back(clipped.particle);
   }
-  const Vec3f a = at(anchors[0]), b = at(anchors[1]);
-  for (std::size_t i = 0; i < count; ++i) {
-    if (const float sq = (b - a).cross(at(i) - a).squaredNorm(); sq > largest_sq) {
-      largest_sq = sq;
-      anchors[2] = i;
-    }
-  }
-  if (!(largest_sq > kLeastWidth_m * kLeastWidth_m * farthest_sq)) return false;
-  for (std::size_t k = 0; k < 3; ++k) clip->placed.anchors[k] = clip->tissue[anchors[k]].particle;
-  return Place(pose, a, b, at(anchors[2]), &clip->placed);
+  // What reads where a clip closes the vessels of a sheet needs places on the sheet.
+  auto anchors = WidestTriangle(of_sheets, particles);
+  if (!anchors) anchors = WidestTriangle(all, particles);
+  if (!anchors) return false;
+  clip->placed.anchors = *anchors;
+  const auto at = [&](std::size_t k) { return particles.At(particles.Ref((*anchors)[k])); };
+  return Place(pose, at(0), at(1), at(2), &clip->placed);
 }
 
 bool Clips::Apply(std::uint8_t tool, const ToolDescription& description, const ToolPose& pose,

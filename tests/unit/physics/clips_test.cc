@@ -8,6 +8,7 @@
 #include <random>
 
 #include "physics_node/clips/rigid_fit.h"
+#include "services/scene/builder/build.h"
 #include "tests/support/whole_topology.h"
 #include "tests/unit/physics/sheet_scene.h"
 
@@ -230,6 +231,28 @@ TEST_F(ClipOnTwoLayers, IsWhereTheJawsWere) {
   ASSERT_TRUE(pose);
   EXPECT_LT((pose->p_WC - pose_.ToWorld(Vec3f(0, 0, -0.5f * clip.length_m))).norm(), 1e-6f);
   EXPECT_LT(pose->q_WC.angularDistance(pose_.q_WT), 1e-3f);
+}
+
+/// What reads where a clip closes the vessels of a sheet has no use for vertices of a solid.
+TEST(Clips, AreAnchoredOnTheSheetWhereTheyHoldSomeOfIt) {
+  scene::SceneData data = scene::BuildProcedural(scene::Small());
+  data.fixed.tools[0] = {ToolKind::kClipApplier, Vec3f(0, 0, 0.15f), 0.0025f, 0.3f, 0.001f, 0.008f};
+  const SceneView scene = data.View();
+  const ParticleStore particles(scene);
+  const auto anchors_of = [&](const std::vector<Index>& held) {
+    Clips clips(scene);
+    const ToolPose pose{scene.rest_position[held.back()], Quatf::Identity(), 0};
+    EXPECT_TRUE(clips.Apply(0, scene.tools[0], pose, held, particles));
+    ClipState state;
+    clips.Fill(&state);
+    return state.clips[0].anchors;
+  };
+  const std::vector<Index> of_the_organ{0, 5, 40, 100};
+  std::vector<Index> of_both = of_the_organ;  // Those of the organ are far apart.
+  const Index node = scene.membrane.first + 10 * scene.membrane.cols + 10;
+  for (const Index next : {0u, 1u, scene.membrane.cols}) of_both.push_back(node + next);
+  for (const Index anchor : anchors_of(of_both)) EXPECT_GE(anchor, scene.membrane.first);
+  for (const Index anchor : anchors_of(of_the_organ)) EXPECT_LT(anchor, scene.tube_vertex_count);
 }
 
 TEST_F(ClipOnTwoLayers, TwoClipsShareNoParticle) {
