@@ -93,7 +93,7 @@ std::optional<runtime::WritablePlaces> WritablePlacesOf(NodeId node, const NodeO
 void ConfineGraphics() {
   runtime::WritablePlaces places{{}, {"/dev/null"}};
   AddGraphics(&places);
-  // What the kernel does not offer is told by `fulcrum doctor --security`.
+  // `fulcrum doctor --security` lists what the kernel does not offer.
   (void)runtime::LimitWriting(places);
   (void)runtime::LimitSystemCalls();
 }

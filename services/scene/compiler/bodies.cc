@@ -14,7 +14,8 @@
 namespace fulcrum::scene {
 namespace {
 
-/// A surface outside these limits was not given in the unit that the description says: nobody would see or touch it.
+/// A surface outside these limits was not given in the unit of the description: it would be too small to be seen, or
+/// larger than the view.
 constexpr double kSmallestFixed_m = 0.001, kLargestFixed_m = 10;
 
 /// Vertices on one side of a body, over a share of its extent in that direction.

@@ -60,7 +60,7 @@ TEST(RecordedCart, EveryTopicIsInTheFileAndDecodes) {
       EXPECT_EQ(decoded[std::string(bus::TopicLabel(role.id))], 0) << role.name;
       continue;
     }
-    // Nothing tears in this scene, nobody clips, and the operator is simulated.
+    // This scene has no tear, no clip applier and no operator's input.
     if (role.id == TopicId::kTearState || role.id == TopicId::kClipState || role.id == TopicId::kOperatorInput)
       continue;
     EXPECT_GE(decoded[std::string(bus::TopicLabel(role.id))], 1) << role.name;

@@ -321,7 +321,7 @@ TEST_F(ClipOnTwoLayers, RestoresItselfAndRefusesWhatNoClipIs) {
   EXPECT_TRUE(refuses([](AppliedClip* c) { c->placed.anchors[1] = 0; }));
   EXPECT_TRUE(refuses([](AppliedClip* c) { c->placed.length_m = 2; }));
   EXPECT_TRUE(refuses([](AppliedClip* c) { c->tissue.resize(2); }));
-  EXPECT_FALSE(Clips(SheetScene(kRows, kCols, kH).View()).Fits(memory, count)) << "nobody applies clips";
+  EXPECT_FALSE(Clips(SheetScene(kRows, kCols, kH).View()).Fits(memory, count)) << "a scene without a clip applier";
 }
 
 }  // namespace

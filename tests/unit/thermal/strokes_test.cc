@@ -1,5 +1,5 @@
-// What single strokes and touches of the hook do: blend opens, coag shrinks all along its way, long heat chars; a nerve
-// is told from a ureter; current on a stretched sheet.
+// What single strokes and touches of the hook do: blend opens, coag shrinks all along its way, long heat chars; events
+// of a nerve are not those of a ureter; current on a stretched sheet.
 #include <gtest/gtest.h>
 
 #include <cmath>

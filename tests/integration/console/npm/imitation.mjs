@@ -73,7 +73,7 @@ export class Imitation {
   }
 }
 
-/** Opens the page with gamepads `pads` and a socket that gives the controls to whoever asks, and keeps what is sent in `sent`. */
+/** Opens the page with gamepads `pads` and a socket that grants the controls to each request, and keeps what is sent in `sent`. */
 export async function openPage(browserPath, address) {
   const browser = await chromium.launch({executablePath: browserPath, args: ['--no-sandbox', '--disable-dev-shm-usage', '--disable-gpu']});
   const page = await browser.newPage({viewport: {width: 1280, height: 800}});
