@@ -14,8 +14,8 @@ namespace {
 
 /// Distance from a line below which tissue is in one line [m]: how it is turned about the line is not known.
 constexpr float kLeastWidth_m = 2e-4f;
-/// Bounds of a clip of a checkpoint [m]: longest clip, farthest place at rest from its middle.
-constexpr float kMostLength_m = 0.1f, kMostReach_m = 1.0f;
+/// Of a clip of a checkpoint, farthest place at rest from its middle [m].
+constexpr float kMostReach_m = 1.0f;
 /// Of the squared norm of a quaternion, far above rounding.
 constexpr float kUnitTolerance = 1e-3f;
 /// Added to J's inverse over its trace: a set in one line has no stiffness about the line.
@@ -295,7 +295,7 @@ bool Clips::Fits(const ClipMemory& memory, Index particle_count) const {
     const Clip& placed = clip.placed;
     // False for NaN.
     if (!(placed.p_AC.norm() <= kMostReach_m && is_unit(placed.q_AC) && is_unit(clip.q_WC) && placed.length_m >= 0.0f &&
-          placed.length_m <= kMostLength_m && placed.tool < kMaxTools && clip.tissue.size() >= kLeastClipped &&
+          placed.length_m <= kMaxClipLength_m && placed.tool < kMaxTools && clip.tissue.size() >= kLeastClipped &&
           clip.tissue.size() <= kMostClipped)) {
       return false;
     }

@@ -7,6 +7,8 @@
 
 namespace fulcrum {
 
+inline constexpr float kMaxClipLength_m = 0.1f;  ///< Of a Clip.
+
 struct ClipPose {
   Vec3f p_WC = Vec3f::Zero();  ///< Middle of the clip [m].
   Quatf q_WC = Quatf::Identity();

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include "services/base/core/clips.h"
+
 namespace fulcrum::bus {
 namespace {
 
@@ -52,9 +54,8 @@ bool IsTool(const ToolSample& t) {
 }
 
 bool IsClip(const Clip& c) {
-  constexpr float kLongestClip_m = 0.1f;
   const auto& a = c.anchors;
-  return Magnitude(c.p_AC, kMaxCoordinate_m) && IsUnit(c.q_AC) && Within(c.length_m, 0.0, kLongestClip_m) &&
+  return Magnitude(c.p_AC, kMaxCoordinate_m) && IsUnit(c.q_AC) && Within(c.length_m, 0.0, kMaxClipLength_m) &&
          c.tool < kMaxTools && a[0] != a[1] && a[1] != a[2] && a[2] != a[0] &&
          std::all_of(a.begin(), a.end(), [](std::uint32_t vertex) { return vertex < kMaxTissueVertices; });
 }
