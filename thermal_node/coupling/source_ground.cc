@@ -1,6 +1,6 @@
 // Where the current of the source window goes: the leak to the tissue beneath, the far field beyond the window, and the
-// Joule heat there, sigma (dV/dr)^2, tented ~ 1 / r^2, in a band that of a strip (band_field). All for a flat sheet of
-// one conductivity.
+// Joule heat there, sigma (dV/dr)^2, tented ~ 1 / r^2, in a band that of a strip (band_field). All for a sheet of one
+// conductivity and the metric under the tip.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -65,8 +65,10 @@ float HeatCells(const Part& part, float scale, Tile* tile) {
   return total;
 }
 
-/// A row of cells of the window: its first cell's place from the middle of the metal, and lengths, in cells.
+/// A row of cells of the window: its first cell's place from the middle of the metal in material space, and rest
+/// lengths, in cells.
 struct LeakRow {
+  SurfaceMetric metric;
   float x0, y;
   float even;         ///< Conductance of a cell to the tissue beneath, of a long wave [S].
   float least, wave;  ///< The metal's radius, and what over the radius gives the ratio to `even`.
@@ -74,8 +76,9 @@ struct LeakRow {
 
 FULCRUM_WIDE
 void LeakOfRow(const LeakRow& row, const float* __restrict tissue, float* __restrict leak) {
+  const float ss = row.metric.ss, cross = 2.0f * row.metric.st * row.y, of_row = row.metric.tt * row.y * row.y;
   for (int i = 0; i < kWindow; ++i) {
-    const float x = row.x0 + static_cast<float>(i), r = std::sqrt(x * x + row.y * row.y);
+    const float x = row.x0 + static_cast<float>(i), r = std::sqrt((ss * x + cross) * x + of_row);
     leak[i] = row.even * LeakRatio(row.wave / (r > row.least ? r : row.least));
   }
   for (int i = 0; i < kWindow; ++i) leak[i] = tissue[i] > 0.0f ? leak[i] : 0.0f;
@@ -145,7 +148,7 @@ float SourceWindow::MetalRadius() const {
   for (int j = gap_low_.iy; j <= gap_high_.iy; ++j) {
     for (int i = gap_low_.ix; i <= gap_high_.ix; ++i) covered += Electrode::Covered(gap_[j * kWindow + i]);
   }
-  return std::max(std::sqrt(covered / std::numbers::pi_v<float>), 1.0f);
+  return std::max(std::sqrt(covered * metric_.area() / std::numbers::pi_v<float>), 1.0f);
 }
 
 void SourceWindow::SetLeak(const Vec2f& middle, bool tented) {
@@ -154,7 +157,7 @@ void SourceWindow::SetLeak(const Vec2f& middle, bool tented) {
   const float x0 = static_cast<float>(corner_.ix + sheet_.origin_x) + 0.5f - middle.x() / cell;
   const float y0 = static_cast<float>(corner_.iy + sheet_.origin_y) + 0.5f - middle.y() / cell;
   for (int j = 0; j < kWindow; ++j) {
-    const LeakRow row{.x0 = x0, .y = y0 + static_cast<float>(j), .even = even, .least = least, .wave = wave};
+    const LeakRow row{metric_, x0, y0 + static_cast<float>(j), even, least, wave};
     LeakOfRow(row, &tissue_[j * kWindow], &leak_[j * kWindow]);
   }
 }
@@ -183,16 +186,19 @@ void SourceWindow::SetGround(const Vec2f& middle, bool tented) {
   far_middle_ = middle;
   far_tented_ = tented;
   std::size_t face_count = 0;
-  const auto add = [&](int i, int j, float face, float stretch, const Vec2f& normal) {
+  const auto stretch = [&](const Vec2f& normal) { return metric_.Length(normal.x(), normal.y()); };
+  const auto add = [&](int i, int j, float face, const Vec2f& normal) {
     const Vec2f r_cells = Vec2f(static_cast<float>(corner_.ix + i + sheet_.origin_x) + 0.5f,
                                 static_cast<float>(corner_.iy + j + sheet_.origin_y) + 0.5f) +
                           0.5f * normal - middle / cell;
-    const float r_m = std::max(r_cells.norm(), 1.0f) * cell;
+    const float r_m = std::max(metric_.Length(r_cells.x(), r_cells.y()), 1.0f) * cell;
     const float kappa = tented ? 1.0f / (r_m * std::log(std::max(kTentRadius_m / r_m, 1.2f))) : far.SlopeAt(r_m);
-    const float cosine = std::max(0.0f, r_cells.dot(normal) * cell / r_m);
+    // Growth of the distance from the metal across the cell, in material lengths: d|r|/ds = (g r)_s / |r|.
+    const float growth = (metric_.ss * r_cells.x() + metric_.st * r_cells.y()) * normal.x() +
+                         (metric_.st * r_cells.x() + metric_.tt * r_cells.y()) * normal.y();
     // Relative slope of the potential per cell.
-    const float slope =
-        strip ? cell * stretch * strip->SlopeAt(r_cells * cell + middle, normal) : cell * stretch * kappa * cosine;
+    const float slope = strip ? cell * stretch(normal) * strip->SlopeAt(r_cells * cell + middle, normal)
+                              : cell * kappa * std::max(0.0f, growth * cell / r_m);
     const float conductance = face * problem_.sigma[j * kWindow + i] * slope / (1.0f + 0.5f * slope);
     // The half cell's heat, two hundredths of it, is counted as heat beyond.
     const float share = tented || strip ? 1.0f : far.ShareAt(r_m);
@@ -200,12 +206,11 @@ void SourceWindow::SetGround(const Vec2f& middle, bool tented) {
     border_[face_count++] = {static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(j), share * conductance,
                              (1.0f - share) * conductance};
   };
-  const float stretch_s = std::sqrt(metric_.ss), stretch_t = std::sqrt(metric_.tt);
   for (int n = 0; n < kWindow; ++n) {
-    add(0, n, problem_.face_s, stretch_s, -Vec2f::UnitX());
-    add(kWindow - 1, n, problem_.face_s, stretch_s, Vec2f::UnitX());
-    add(n, 0, problem_.face_t, stretch_t, -Vec2f::UnitY());
-    add(n, kWindow - 1, problem_.face_t, stretch_t, Vec2f::UnitY());
+    add(0, n, problem_.face_s, -Vec2f::UnitX());
+    add(kWindow - 1, n, problem_.face_s, Vec2f::UnitX());
+    add(n, 0, problem_.face_t, -Vec2f::UnitY());
+    add(n, kWindow - 1, problem_.face_t, Vec2f::UnitY());
   }
 }
 
@@ -242,7 +247,9 @@ void SourceWindow::DepositFar(HeatField* field, bool hold, Ledger* ledger) {
   // Middle in cells of the sheet's tiles.
   const Vec2f origin(static_cast<float>(sheet_.origin_x), static_cast<float>(sheet_.origin_y));
   const Vec2f middle = far_middle_ / cell - origin;
-  Vec2f low = middle - Vec2f::Constant(reach), high = middle + Vec2f::Constant(reach);
+  // The box around the ellipse that the circle of this rest radius is in material space.
+  const Vec2f half = reach / metric_.area() * Vec2f(std::sqrt(metric_.tt), std::sqrt(metric_.ss));
+  Vec2f low = middle - half, high = middle + half;
   std::optional<BandField> strip;
   if (const Band* band = sheet_.BandOf(number_)) {
     strip.emplace(*band, far_middle_);
@@ -253,7 +260,8 @@ void SourceWindow::DepositFar(HeatField* field, bool hold, Ledger* ledger) {
   const auto density_at = [&](int ix, int iy) {
     const Vec2f centre = Vec2f(static_cast<float>(ix), static_cast<float>(iy)) + Vec2f::Constant(0.5f * kBlock);
     if (strip) return strip->DensityAt((centre + origin) * cell);
-    const float r = std::max((centre - middle).norm(), 1.0f);
+    const Vec2f away = centre - middle;
+    const float r = std::max(metric_.Length(away.x(), away.y()), 1.0f);
     return r >= reach ? 0.0f : far_tented_ ? 1.0f / (r * r) : far.DensityAt(r * cell);
   };
   const int columns = tile_of(high.x()) - tile_of(low.x()) + 1, rows = tile_of(high.y()) - tile_of(low.y()) + 1;

@@ -28,6 +28,8 @@ struct SurfaceMetric {
   float ss = 1, st = 0, tt = 1;
 
   [[nodiscard]] float area() const { return std::sqrt(ss * tt - st * st); }  ///< Rest area over material area.
+  /// Rest length of a vector (s, t) of material space.
+  [[nodiscard]] float Length(float s, float t) const { return std::sqrt((ss * s + 2.0f * st * t) * s + tt * t * t); }
 };
 /// Limits of the stretch; they bound the rate of the explicit step on degenerate maps.
 inline constexpr float kStretchMin = 0.5f, kStretchMax = 2.0f;
