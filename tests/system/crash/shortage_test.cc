@@ -5,6 +5,8 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <thread>
 
@@ -58,7 +60,7 @@ class Shortage : public ::testing::Test {
     return WaitFor(kPatience_s, [&] { return cart_.Said().find(words) != std::string::npos; });
   }
 
-  Cart cart_{"small", kDomain, {"--record", "--seconds", "300"}};
+  Cart cart_{"small", kDomain, {"--record", "--seconds", "300", "--allow-swap-command"}};
 };
 
 TEST(ShortageAtStart, TooFewFilesAreRefusedWithLimitAndNeed) {
@@ -82,23 +84,38 @@ TEST_F(Shortage, WithoutDescriptorsTheSupervisorKeepsTheSessionAndStartsTheNodeL
 }
 
 TEST_F(Shortage, ANodeWithoutMemoryEndsWithALineAndIsStartedAgain) {
+  // The limit is of one start of the node alone: inherited from the supervisor, it would end the supervisor as well.
+  // 64 MiB are enough for the program, not for its threads and grids.
+  const auto build = cart_.session() / "thermal_node", once = cart_.session() / "short_of_memory";
+  std::ofstream(build) << "#!/bin/sh\nif rm " << once << " 2>/dev/null; then ulimit -Sv 65536; fi\n"
+                       << "exec " FULCRUM_BIN_DIR "/thermal_node \"$@\"\n";
+  std::filesystem::permissions(build, std::filesystem::perms::owner_all);
+  const pid_t first = Node("thermal_node");
+  ASSERT_GT(first, 0);
+  Program swap("fulcrum", {"swap", "thermal_node", "--with", build, "--domain", std::to_string(kDomain)});
+  ASSERT_EQ(swap.End(0), 0) << swap.Said();
+  // A replacement that ends before it has reported gives way to the program before it.
+  const auto reported = [&] {
+    Program status("fulcrum", {"status", "--domain", std::to_string(kDomain)});
+    status.End(0);
+    const pid_t now = Node("thermal_node");
+    return now > 0 && now != first && status.Said().find(" " + std::to_string(now) + " ") != std::string::npos;
+  };
+  ASSERT_TRUE(WaitFor(kPatience_s, reported)) << cart_.Said();
   const pid_t victim = Node("thermal_node");
-  ASSERT_GT(victim, 0);
   const auto log = [&] { return testing::ReadFile(cart_.session() / "logs" / "thermal_node.log"); };
-  {
-    constexpr rlim_t kRoom = 64 << 20;  // Enough for the program, not for its threads and grids.
-    const Limit limit(cart_.pid(), RLIMIT_AS, kRoom);
-    ::kill(victim, SIGKILL);
-    EXPECT_TRUE(WaitFor(kPatience_s,
-                        [&] {
-                          // From a thread of the bus, or from the node itself.
-                          return log().find("address space is limited to 64 MiB") != std::string::npos ||
-                                 log().find("out of memory") != std::string::npos ||
-                                 // Fast DDS 2.9.1, when one of its threads cannot start while a participant is made.
-                                 log().find("Assertion `mInputSockets.size() == 0' failed") != std::string::npos;
-                        }))
-        << cart_.Said() << log();
-  }
+  std::ofstream{once};
+  ::kill(victim, SIGKILL);
+  EXPECT_TRUE(WaitFor(kPatience_s,
+                      [&] {
+                        // From a thread of the bus, or from the node itself.
+                        return log().find("address space is limited to 64 MiB") != std::string::npos ||
+                               log().find("out of memory") != std::string::npos ||
+                               // Fast DDS 2.9.1, when one of its threads cannot start while a participant is made.
+                               log().find("Assertion `mInputSockets.size() == 0' failed") != std::string::npos;
+                      }))
+      << cart_.Said() << log();
+  EXPECT_FALSE(std::filesystem::exists(once)) << "the limit was not set";
   ExpectTheNodeIsBackAndTheSessionEnds("thermal_node", victim);
 }
 
