@@ -1,5 +1,6 @@
 #include "services/session/supervisor/generator_panel.h"
 
+#include <algorithm>
 #include <charconv>
 #include <limits>
 #include <sstream>
@@ -12,14 +13,14 @@
 namespace fulcrum::supervisor {
 namespace {
 
-struct Knob {
+struct PanelKnob {
   std::string_view name;
   CauteryMode mode;
   float GeneratorSetting::*power_W;
 };
-constexpr std::array<Knob, 3> kKnobs{{{"cut", CauteryMode::kCut, &GeneratorSetting::cut_W},
-                                      {"coag", CauteryMode::kCoag, &GeneratorSetting::coag_W},
-                                      {"blend", CauteryMode::kBlend, &GeneratorSetting::blend_W}}};
+constexpr std::array<PanelKnob, 3> kKnobs{{{"cut", CauteryMode::kCut, &GeneratorSetting::cut_W},
+                                           {"coag", CauteryMode::kCoag, &GeneratorSetting::coag_W},
+                                           {"blend", CauteryMode::kBlend, &GeneratorSetting::blend_W}}};
 
 [[noreturn]] void Refuse(const std::string& word, const std::string& why) {
   throw InputError("generator: \"" + word + "\" " + why + "; valid: cut=W, coag=W, blend=W with 0 to " +
@@ -28,50 +29,45 @@ constexpr std::array<Knob, 3> kKnobs{{{"cut", CauteryMode::kCut, &GeneratorSetti
 
 }  // namespace
 
-GeneratorPanel::GeneratorPanel(const config::GeneratorConfig& start, std::span<const ScriptKey> script)
-    : script_(script) {
+GeneratorPanel::GeneratorPanel(const config::GeneratorConfig& start, std::span<const ScriptKey> script) {
   setting_.cut_W = start.cut_W;
   setting_.coag_W = start.coag_W;
   setting_.blend_W = start.blend_W;
-  for (std::size_t i = 0; i < kKnobs.size(); ++i) scripted_[i] = setting_.*kKnobs[i].power_W;
+  for (std::size_t i = 0; i < script.size(); ++i) {
+    const ScriptKey& key = script[i];
+    if (!(key.power_W > 0)) continue;
+    const bool last = i + 1 == script.size() || script[i + 1].tool != key.tool;
+    const double end_s = last ? std::numeric_limits<double>::infinity() : static_cast<double>(script[i + 1].time_s);
+    const CauteryMode mode = ModeOf(static_cast<std::uint8_t>(key.pedals));
+    for (std::size_t knob = 0; knob < kKnobs.size(); ++knob) {
+      if (mode == kKnobs[knob].mode) {
+        knobs_[knob].uses.push_back({static_cast<double>(key.time_s), end_s, key.power_W});
+      }
+    }
+  }
+  for (std::size_t knob = 0; knob < kKnobs.size(); ++knob) {
+    knobs_[knob].power_W = setting_.*kKnobs[knob].power_W;
+    // The script is sorted by tool, then time.
+    std::ranges::stable_sort(knobs_[knob].uses, {}, &Use::begin_s);
+  }
   Follow(-1);
 }
 
-/// Power of each mode at a session time: that of the current use of its pedal, else of the next use, else of the last.
-GeneratorPanel::Powers GeneratorPanel::Scripted(double session_time_s) const {
-  Powers powers = scripted_;
-  for (std::size_t knob = 0; knob < kKnobs.size(); ++knob) {
-    double next_s = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < script_.size(); ++i) {
-      const ScriptKey& key = script_[i];
-      if (ModeOf(static_cast<std::uint8_t>(key.pedals)) != kKnobs[knob].mode || !(key.power_W > 0)) continue;
-      const bool last = i + 1 == script_.size() || script_[i + 1].tool != key.tool;
-      const double end_s = last ? std::numeric_limits<double>::infinity() : static_cast<double>(script_[i + 1].time_s);
-      const auto begin_s = static_cast<double>(key.time_s);
-      if (end_s <= session_time_s || begin_s >= next_s) continue;
-      next_s = begin_s;
-      powers[knob] = key.power_W;
-    }
-  }
-  return powers;
-}
-
 bool GeneratorPanel::Follow(double session_time_s) {
-  const Powers wanted = Scripted(session_time_s);
   bool turned = false;
   for (std::size_t i = 0; i < kKnobs.size(); ++i) {
-    if (wanted[i] == scripted_[i]) continue;
-    setting_.*kKnobs[i].power_W = wanted[i];
+    Knob& knob = knobs_[i];
+    double ended_s = -1;
+    while (knob.current < knob.uses.size() && knob.uses[knob.current].end_s <= session_time_s) {
+      ended_s = std::max(ended_s, knob.uses[knob.current++].end_s);
+    }
+    if (knob.current == knob.uses.size() || knob.uses[knob.current].power_W == knob.power_W) continue;
+    knob.power_W = knob.uses[knob.current].power_W;
+    setting_.*kKnobs[i].power_W = knob.power_W;
+    turned_s_ = turned ? std::max(turned_s_, ended_s) : ended_s;
     turned = true;
   }
-  if (!turned) return false;
-  scripted_ = wanted;
-  turned_s_ = -1;
-  for (const ScriptKey& key : script_) {
-    const auto key_s = static_cast<double>(key.time_s);
-    if (key_s <= session_time_s && key_s > turned_s_) turned_s_ = key_s;
-  }
-  return true;
+  return turned;
 }
 
 void GeneratorPanel::Turn(const std::string& words) {
@@ -79,8 +75,8 @@ void GeneratorPanel::Turn(const std::string& words) {
   std::istringstream in(words);
   for (std::string word; in >> word;) {
     const std::size_t equals = word.find('=');
-    const Knob* knob = nullptr;
-    for (const Knob& known : kKnobs) {
+    const PanelKnob* knob = nullptr;
+    for (const PanelKnob& known : kKnobs) {
       if (equals != std::string::npos && known.name == std::string_view(word).substr(0, equals)) knob = &known;
     }
     if (knob == nullptr) Refuse(word, "names no knob");
@@ -96,7 +92,7 @@ void GeneratorPanel::Turn(const std::string& words) {
 
 std::string GeneratorPanel::Text() const {
   std::string text;
-  for (const Knob& knob : kKnobs) {
+  for (const PanelKnob& knob : kKnobs) {
     const auto power_W = static_cast<double>(setting_.*knob.power_W);
     text.append(text.empty() ? "" : ", ").append(knob.name).append(" ");
     text += Fixed(power_W, power_W == static_cast<int>(power_W) ? 0 : 1) + " W";

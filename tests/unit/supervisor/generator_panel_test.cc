@@ -1,6 +1,7 @@
 #include "services/session/supervisor/generator_panel.h"
 
 #include <gtest/gtest.h>
+#include <time.h>
 
 #include <string>
 #include <vector>
@@ -58,6 +59,47 @@ TEST_F(Panel, WhatOthersTurnStaysUntilTheScriptTurnsThatKnob) {
   EXPECT_EQ(panel.setting().cut_W, 50);
   EXPECT_EQ(panel.setting().blend_W, 10.5f);
   EXPECT_EQ(panel.Text(), "cut 50 W, coag 20 W, blend 10.5 W");
+}
+
+/// `uses` cuts of a second, every two seconds, by tool 1; each at another power.
+std::vector<ScriptKey> ManyUses(int uses) {
+  std::vector<ScriptKey> script{Key(0, 0, 0, 0)};
+  for (int i = 0; i < uses; ++i) {
+    const auto begin_s = static_cast<float>(2 * i + 1);
+    script.push_back(Key(begin_s, 1, kPedalCut, static_cast<float>(20 + i % 7)));
+    script.push_back(Key(begin_s + 1, 1, 0, 0));
+  }
+  return script;
+}
+
+TEST_F(Panel, TwoToolsUseAKnobInTheOrderOfTime) {
+  const std::vector<ScriptKey> script = {Key(1, 0, kPedalCut, 20), Key(9, 0, 0, 0), Key(2, 1, kPedalCut, 30),
+                                         Key(3, 1, 0, 0), Key(12, 1, kPedalCut, 40)};
+  GeneratorPanel panel(cart_, script);
+  EXPECT_EQ(panel.setting().cut_W, 20);
+  EXPECT_FALSE(panel.Follow(8.9)) << "the first use goes on";
+  EXPECT_TRUE(panel.Follow(9.01));
+  EXPECT_EQ(panel.setting().cut_W, 40);
+  EXPECT_EQ(panel.turned_s(), 9) << "not the time of the use that the other tool has ended before";
+}
+
+TEST_F(Panel, ATurnCostsTheSameHoweverLongTheScriptIs) {
+  const auto seconds = [&](const std::vector<ScriptKey>& script) {
+    GeneratorPanel panel(cart_, script);
+    const auto now = [] {
+      timespec t{};
+      ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+      return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+    };
+    const double begin = now();
+    int turns = 0;
+    for (int i = 0; i < 20000; ++i) turns += panel.Follow(0.02 * i) ? 1 : 0;
+    EXPECT_GT(turns, 100);
+    return now() - begin;
+  };
+  const std::vector<ScriptKey> one = ManyUses(300), many = ManyUses(180000);
+  (void)seconds(one);
+  EXPECT_LT(seconds(many), 20 * seconds(one)) << "600 times as many keys";
 }
 
 TEST_F(Panel, WhatIsNoSettingIsRefusedAndTurnsNothing) {
