@@ -103,15 +103,16 @@ TlsIdentity Parsed(std::string certificate, std::string key, const std::filesyst
   const Certificate parsed(PEM_read_bio_X509(Reader(certificate).get(), nullptr, nullptr, nullptr));
   const Key parsed_key(PEM_read_bio_PrivateKey(Reader(key).get(), nullptr, no_password, nullptr));
   const bool good = parsed && parsed_key && X509_check_private_key(parsed.get(), parsed_key.get()) == 1;
-  std::tm end{};
-  const bool dated = good && ASN1_TIME_to_tm(X509_get0_notAfter(parsed.get()), &end) == 1;
+  std::tm begin{}, end{};
+  const bool dated = good && ASN1_TIME_to_tm(X509_get0_notBefore(parsed.get()), &begin) == 1 &&
+                     ASN1_TIME_to_tm(X509_get0_notAfter(parsed.get()), &end) == 1;
   ERR_clear_error();
   if (!dated) {
     throw InputError(file.string() +
                      ": is no certificate with its key beside it (console.key); remove both files to get new ones");
   }
   std::string fingerprint = FingerprintOf(parsed.get());
-  return {std::move(certificate), std::move(key), std::move(fingerprint), ::timegm(&end)};
+  return {std::move(certificate), std::move(key), std::move(fingerprint), ::timegm(&begin), ::timegm(&end)};
 }
 
 }  // namespace
@@ -126,8 +127,9 @@ TlsIdentity MakeTlsIdentity(const std::vector<std::string>& names, std::time_t n
   Must(BN_to_ASN1_INTEGER(serial.get(), X509_get_serialNumber(certificate)) != nullptr, "serial number");
   Must(X509_set_version(certificate, kVersion3) == 1, "version");
   // An hour ago: the clock of the client may be behind.
-  Must(ASN1_TIME_set(X509_getm_notBefore(certificate), now - 3600) != nullptr, "time");
-  Must(ASN1_TIME_set(X509_getm_notAfter(certificate), now + kValidity) != nullptr, "time");
+  const std::time_t from = now - 3600, until = now + kValidity;
+  Must(ASN1_TIME_set(X509_getm_notBefore(certificate), from) != nullptr, "time");
+  Must(ASN1_TIME_set(X509_getm_notAfter(certificate), until) != nullptr, "time");
   X509_NAME* const subject = X509_get_subject_name(certificate);
   const auto* common = reinterpret_cast<const unsigned char*>("Fulcrum console");
   Must(X509_NAME_add_entry_by_txt(subject, "CN", MBSTRING_UTF8, common, -1, -1, 0) == 1, "name");
@@ -143,7 +145,7 @@ TlsIdentity MakeTlsIdentity(const std::vector<std::string>& names, std::time_t n
   const Bio pem(BIO_new(BIO_s_mem())), key_pem(BIO_new(BIO_s_mem()));
   Must(PEM_write_bio_X509(pem.get(), certificate) == 1, "write");
   Must(PEM_write_bio_PrivateKey(key_pem.get(), key.get(), nullptr, nullptr, 0, nullptr, nullptr) == 1, "write");
-  return {TextOf(pem), TextOf(key_pem), FingerprintOf(certificate), now + kValidity};
+  return {TextOf(pem), TextOf(key_pem), FingerprintOf(certificate), from, until};
 }
 
 TlsIdentity LoadTlsIdentity(const std::filesystem::path& folder, const std::vector<std::string>& names, std::time_t now,
@@ -155,7 +157,7 @@ TlsIdentity LoadTlsIdentity(const std::filesystem::path& folder, const std::vect
     TlsIdentity identity =
         Parsed(runtime::ReadPrivateFile(file, kLargestFile, "certificate"),
                runtime::ReadPrivateFile(key_file, kLargestFile, "key of the console's certificate"), file);
-    *made = identity.until < now + kRenewal;
+    *made = identity.until < now + kRenewal || identity.from > now;
     if (!*made) return identity;
   }
   *made = true;

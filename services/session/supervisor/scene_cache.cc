@@ -162,14 +162,16 @@ void Compile(const SceneRequest& request, const fs::path& yaml, const fs::path& 
   }
 }
 
-/// Removes the versions of a scene that were used longest ago, with what lies beside them: logs, forecasts, and parts
-/// of compilations that were interrupted.
-void RemoveOldVersions(const fs::path& cache, const std::string& stem) {
+/// Removes the versions of the scene of `newest` that were used longest ago, with what lies beside them: logs,
+/// forecasts, and parts of compilations that were interrupted. Keeps `newest`, and counts a time in the future as the
+/// oldest: the clock was wrong when that version was used.
+void RemoveOldVersions(const fs::path& cache, const std::string& stem, const fs::path& newest) {
   constexpr std::size_t kDigits = 16;  // Of the hash; see ResolveScene.
   struct Version {
     fs::file_time_type used = fs::file_time_type::min();
     std::vector<fs::path> files;
   };
+  const auto now = fs::file_time_type::clock::now();
   std::map<std::string, Version> by_key;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(cache, error)) {
@@ -177,9 +179,11 @@ void RemoveOldVersions(const fs::path& cache, const std::string& stem) {
     const std::size_t end = stem.size() + 1 + kDigits;
     if (!name.starts_with(stem + "-") || name.find('.', stem.size()) != end) continue;
     Version& version = by_key[name.substr(0, end)];
-    version.used = std::max(version.used, entry.last_write_time(error));
+    const auto used = entry.last_write_time(error);
+    if (used <= now) version.used = std::max(version.used, used);
     version.files.push_back(entry.path());
   }
+  by_key[newest.stem()].used = fs::file_time_type::max();
   std::vector<Version> versions;
   for (auto& [key, version] : by_key) versions.push_back(std::move(version));
   std::sort(versions.begin(), versions.end(), [](const Version& a, const Version& b) { return a.used > b.used; });
@@ -237,7 +241,7 @@ fs::path ResolveScene(const SceneRequest& request) {
       throw InputError("cannot make " + request.cache.string() + ": " + error.message());
     }
     Compile(request, source, target);
-    RemoveOldVersions(request.cache, source.stem());
+    RemoveOldVersions(request.cache, source.stem(), target);
   }
   return target;
 }

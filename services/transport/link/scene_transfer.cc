@@ -101,12 +101,15 @@ bool IsScene(const fs::path& file, std::uint64_t hash) {
 
 void MakeRoomForScene(const fs::path& cache) {
   constexpr std::size_t kDigits = 16;
+  const auto now = fs::file_time_type::clock::now();
   std::vector<std::pair<fs::file_time_type, fs::path>> scenes;
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(cache, ignored)) {
     const std::string name = entry.path().filename();
     if (name.find_first_not_of("0123456789abcdef") != kDigits || !name.ends_with(".fulcrum")) continue;
-    scenes.emplace_back(entry.last_write_time(ignored), entry.path());
+    // A time in the future counts as the oldest: the clock was wrong when that scene was stored.
+    const auto stored = entry.last_write_time(ignored);
+    scenes.emplace_back(stored <= now ? stored : fs::file_time_type::min(), entry.path());
   }
   std::ranges::sort(scenes);
   for (std::size_t i = 0; i + kMostCachedScenes <= scenes.size(); ++i) fs::remove(scenes[i].second, ignored);

@@ -318,6 +318,20 @@ TEST(SceneTransfer, TheCacheKeepsTheNewestScenesAndNothingElseIsRemoved) {
   fs::remove_all(cache);
 }
 
+TEST(SceneTransfer, TimesFromAClockThatWasAheadCountAsTheOldest) {
+  const fs::path cache = fs::temp_directory_path() / ("link-cache-ahead-" + std::to_string(::getpid()));
+  fs::create_directories(cache);
+  const fs::path present = CachedScene(cache, 999);
+  std::ofstream(present) << "x";
+  for (std::uint64_t i = 0; i < kMostCachedScenes; ++i) {
+    std::ofstream(CachedScene(cache, i + 1)) << "x";
+    fs::last_write_time(CachedScene(cache, i + 1), fs::file_time_type::clock::now() + std::chrono::hours(24));
+  }
+  MakeRoomForScene(cache);
+  EXPECT_TRUE(fs::exists(present));
+  fs::remove_all(cache);
+}
+
 TEST(SceneTransfer, AReceivedSceneHasTheOfferedNameAndThatIsNoPath) {
   Offer offer = SomeOffer(1);
   SceneView scene;

@@ -127,6 +127,17 @@ TEST_F(TlsFolder, KeepsItsIdentityUntilItEnds) {
   EXPECT_NE(renewed.fingerprint, first.fingerprint);
 }
 
+TEST_F(TlsFolder, AnIdentityMadeWhileTheClockWasAheadIsRenewed) {
+  constexpr std::time_t kNow = 1'800'000'000, kDay = 24 * 3600;
+  const TlsIdentity ahead = Load(kNow + 400 * kDay);
+  const TlsIdentity renewed = Load(kNow);
+  EXPECT_TRUE(made_);
+  EXPECT_NE(renewed.fingerprint, ahead.fingerprint);
+  EXPECT_LT(renewed.from, kNow);
+  (void)Load(kNow);
+  EXPECT_FALSE(made_);
+}
+
 TEST_F(TlsFolder, FilesThatCannotBeTrustedAreRefused) {
   (void)Load();
   ::chmod((folder_ / "console.key").c_str(), 0644);

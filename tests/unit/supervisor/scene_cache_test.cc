@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "services/base/core/error.h"
 #include "tests/unit/supervisor/temporary_folder.h"
@@ -175,6 +177,23 @@ TEST_F(SceneCacheTest, KeepsTheVersionsThatWereUsedLast) {
   }
   EXPECT_EQ(scenes, kKeptVersions + 1);
   EXPECT_EQ(beside, 2 * (kKeptVersions - 1));
+}
+
+TEST_F(SceneCacheTest, TimesFromAClockThatWasAheadCountAsTheOldest) {
+  request_.name = "one";
+  fs::create_directory(request_.cache);
+  const auto tomorrow = fs::file_time_type::clock::now() + std::chrono::hours(24);
+  for (std::size_t i = 0; i < kKeptVersions; ++i) {
+    const fs::path file = request_.cache / ("one-000000000000000" + std::to_string(i) + ".fulcrum");
+    std::ofstream(file) << "of a wrong clock";
+    fs::last_write_time(file, tomorrow);
+  }
+  std::vector<fs::path> made;
+  for (std::size_t i = 0; i < kKeptVersions; ++i) {
+    std::ofstream(request_.library / "one.yaml") << "name: one\ndescription: " << i << "\n";
+    made.push_back(ResolveScene(request_));
+    for (const fs::path& file : made) EXPECT_TRUE(fs::exists(file)) << "after " << i;
+  }
 }
 
 TEST_F(SceneCacheTest, CompiledFileIsTakenAsItIs) {
