@@ -16,6 +16,7 @@ fulcrum::ExitCode RunBridge(fulcrum::app::NodeApp& app) {
   using fulcrum::config::LinkKind;
   const fulcrum::config::CartConfig cart = ForScene(app.cart(), app.scene());
   const bool operated = HasLinks(cart, LinkKind::kOperator);
+  const ScriptedHands scripted(app.scene(), cart);
   OperatedHands hands(cart, app.scene());
   fulcrum::OperatorChoice choice;
   fulcrum::OperatorInput sample;
@@ -27,7 +28,7 @@ fulcrum::ExitCode RunBridge(fulcrum::app::NodeApp& app) {
     while (inputs != nullptr && inputs->TakeNext(&sample)) (void)choice.Add(sample);
     const double time_s = app.SessionTime(now_ns);
     if (time_s < 0) return std::nullopt;
-    return hands.Replace(FollowScript(app.scene(), cart, time_s), choice.At(now_ns));
+    return hands.Replace(scripted.At(time_s), choice.At(now_ns));
   };
   const auto firmware = operated || HasLinks(cart, LinkKind::kSimulated)
                             ? std::make_unique<SimulatedFirmware>(input_at, MakeSimulatedUnits(cart))

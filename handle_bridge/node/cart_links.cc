@@ -1,6 +1,7 @@
 #include "handle_bridge/node/cart_links.h"
 
 #include <algorithm>
+#include <limits>
 #include <memory>
 #include <numbers>
 #include <utility>
@@ -91,17 +92,23 @@ LinkFaults FaultsAt(const config::SimulatedUnit& unit, double session_time_s) {
   return faults;
 }
 
-SimulatedInput FollowScript(const SceneView& scene, const config::CartConfig& cart, double session_time_s) {
-  SimulatedInput input;
+ScriptedHands::ScriptedHands(const SceneView& scene, const config::CartConfig& cart) : scene_(scene), cart_(cart) {
   for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
     const bool stays = scene.tools[tool].assists() && cart.handles[tool].kind == config::LinkKind::kOperator;
-    const double time_s = stays ? std::min(session_time_s, LastHoldOf(scene.script, tool)) : session_time_s;
-    const ScriptPoint point = EvaluateScript(scene.script, tool, time_s);
+    // Once: a script that a hand performs has 180,000 keys of a tool in an hour, and the firmware asks at 400 Hz.
+    stays_s_[tool] = stays ? LastHoldOf(scene.script, tool) : std::numeric_limits<double>::infinity();
+  }
+}
+
+SimulatedInput ScriptedHands::At(double session_time_s) const {
+  SimulatedInput input;
+  for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
+    const ScriptPoint point = EvaluateScript(scene_.script, tool, std::min(session_time_s, stays_s_[tool]));
     input.jaw_deg[tool] = kDegPerRad * point.jaw_rad;
     input.pedals = static_cast<std::uint8_t>(input.pedals | point.pedals);
-    input.faults[tool] = FaultsAt(cart.handles[tool].simulated, session_time_s);
+    input.faults[tool] = FaultsAt(cart_.handles[tool].simulated, session_time_s);
   }
-  input.faults[kPedalLink] = FaultsAt(cart.pedal.simulated, session_time_s);
+  input.faults[kPedalLink] = FaultsAt(cart_.pedal.simulated, session_time_s);
   return input;
 }
 

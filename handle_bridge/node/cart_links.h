@@ -29,8 +29,18 @@ namespace fulcrum::handle_bridge {
 /// Jaws and pedals of the scripted operator and the faults of the cart's links; a pedal is pressed if it is in any
 /// tool's key. Before the session has started (negative time) the jaws have the angles of their first key and all
 /// pedals are released.
-[[nodiscard]] SimulatedInput FollowScript(const SceneView& scene, const config::CartConfig& cart,
-                                          double session_time_s);
+class ScriptedHands {
+ public:
+  /// `scene` and `cart` must outlive this.
+  ScriptedHands(const SceneView& scene, const config::CartConfig& cart);
+  [[nodiscard]] SimulatedInput At(double session_time_s) const;
+
+ private:
+  const SceneView& scene_;
+  const config::CartConfig& cart_;
+  /// Session time at which a tool's script stands still [s]: LastHoldOf of an assistant beside a person, else infinite.
+  std::array<double, kMaxTools> stays_s_{};
+};
 
 /// Handles and pedal of kind `operator`: simulated firmware whose jaws and pedals are an operator's instead of the
 /// script's.

@@ -53,19 +53,34 @@ TEST(FaultsAt, FollowTheCartsWindows) {
   EXPECT_FALSE(FaultsAt(unit, 99).silent);
 }
 
-TEST(FollowScript, GivesTheFirstKeyBeforeTheSessionAndThePedalsOfAllTools) {
+TEST(ScriptedHands, GiveTheFirstKeyBeforeTheSessionAndThePedalsOfAllTools) {
   const std::array keys = {ScriptKey{1, 0, Vec3f::Zero(), 0.8f, 0, 0}, ScriptKey{3, 0, Vec3f::Zero(), 0.2f, 0, 0},
                            ScriptKey{0, 1, Vec3f::Zero(), 0.0f, 0, 0},
                            ScriptKey{2, 1, Vec3f::Zero(), 0.0f, kPedalCut, 35},
                            ScriptKey{4, 1, Vec3f::Zero(), 0.0f, 0, 0}};
   SceneView scene;
   scene.script = keys;
-  EXPECT_NEAR(FollowScript(scene, {}, -1).jaw_deg[0], 0.8 * kDegPerRad, 1e-3);
-  EXPECT_EQ(FollowScript(scene, {}, -1).pedals, 0);
-  EXPECT_NEAR(FollowScript(scene, {}, 2).jaw_deg[0], 0.5 * kDegPerRad, 1e-3);
-  EXPECT_EQ(FollowScript(scene, {}, 3.9).pedals, kPedalCut);
-  EXPECT_EQ(FollowScript(scene, {}, 4).pedals, 0);
-  EXPECT_NEAR(FollowScript(scene, {}, 99).jaw_deg[0], 0.2 * kDegPerRad, 1e-3);
+  const config::CartConfig cart;
+  const ScriptedHands hands(scene, cart);
+  EXPECT_NEAR(hands.At(-1).jaw_deg[0], 0.8 * kDegPerRad, 1e-3);
+  EXPECT_EQ(hands.At(-1).pedals, 0);
+  EXPECT_NEAR(hands.At(2).jaw_deg[0], 0.5 * kDegPerRad, 1e-3);
+  EXPECT_EQ(hands.At(3.9).pedals, kPedalCut);
+  EXPECT_EQ(hands.At(4).pedals, 0);
+  EXPECT_NEAR(hands.At(99).jaw_deg[0], 0.2 * kDegPerRad, 1e-3);
+}
+
+TEST(ScriptedHands, AnAssistantBesideAPersonHoldsOn) {
+  const std::array keys = {ScriptKey{1, 0, Vec3f::Zero(), 0.8f, 0, 0}, ScriptKey{3, 0, Vec3f::Zero(), 0.1f, 0, 0},
+                           ScriptKey{5, 0, Vec3f::Zero(), 0.8f, 0, 0}};
+  SceneView scene;
+  scene.script = keys;
+  scene.tools[0].kind = ToolKind::kGrasper;
+  scene.tools[0].traction_N = 1;
+  config::CartConfig cart;
+  EXPECT_NEAR(ScriptedHands(scene, cart).At(9).jaw_deg[0], 0.8 * kDegPerRad, 1e-3);
+  cart.handles[0].kind = config::LinkKind::kOperator;
+  EXPECT_NEAR(ScriptedHands(scene, cart).At(9).jaw_deg[0], 0.1 * kDegPerRad, 1e-3);
 }
 
 }  // namespace
