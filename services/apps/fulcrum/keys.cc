@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <cstdio>
 #include <ctime>
 
@@ -62,6 +64,12 @@ ExitCode Init(const fs::path& folder, int days, bool force) {
       "forbid new identities for good.\n",
       folder.c_str(), bus::kAccessRoles.size(), keys::DateOf(now + days * kDay_s).c_str(),
       fs::absolute(folder).lexically_normal().c_str(), keys::AuthorityKeyFile(folder).c_str());
+  if (::geteuid() == 0) {
+    std::printf(
+        "\nThe folder is root's, and only its owner can start a cart with it. Give it to the user who runs the cart; "
+        "the\nservices run as user fulcrum:\n\n  sudo chown -R fulcrum: %s\n",
+        fs::absolute(folder).lexically_normal().c_str());
+  }
   return ExitCode::kDone;
 }
 

@@ -42,25 +42,39 @@ void CheckPrivate(const fs::path& path, bool folder) {
   }
 }
 
-void Write(const fs::path& file, const std::string& text) {
+namespace {
+
+enum class Owner { kOfFolder, kThisUser };
+
+void Make(const fs::path& file, const std::string& text, Owner owner) {
   const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-  const bool written = fd >= 0 && ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size());
+  struct stat folder {};
+  const bool give =
+      fd >= 0 && owner == Owner::kOfFolder && ::geteuid() == 0 && ::stat(file.parent_path().c_str(), &folder) == 0;
+  const bool given = !give || ::fchown(fd, folder.st_uid, folder.st_gid) == 0;
+  const bool written = fd >= 0 && given && ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size());
   const int error = errno;
   if (fd >= 0) ::close(fd);
   if (!written) throw InputError(file.string() + ": cannot be written: " + std::strerror(error));
 }
 
-void Replace(const fs::path& file, const std::string& text) {
+void MakeAnew(const fs::path& file, const std::string& text, Owner owner) {
   fs::path fresh = file;
   fresh += ".new";
   std::error_code error;
   fs::remove(fresh, error);  // Of a process that was killed here.
-  Write(fresh, text);
+  Make(fresh, text, owner);
   fs::rename(fresh, file, error);
   if (!error) return;
   fs::remove(fresh);
   throw InputError(file.string() + ": cannot be replaced: " + error.message());
 }
+
+}  // namespace
+
+void Write(const fs::path& file, const std::string& text) { Make(file, text, Owner::kOfFolder); }
+void Replace(const fs::path& file, const std::string& text) { MakeAnew(file, text, Owner::kOfFolder); }
+void ReplaceOwn(const fs::path& file, const std::string& text) { MakeAnew(file, text, Owner::kThisUser); }
 
 bool HasFile(const fs::path& file) {
   std::error_code ignored;

@@ -153,7 +153,7 @@ void MakeKeyFolder(const fs::path& folder, const Validity& validity, bool force)
     FillKeyFolder(fresh, authority, slack);
     if (HasFile(folder)) fs::remove_all(folder);
     fs::rename(fresh, Plain(folder));
-    Replace(AuthorityKeyFile(folder), authority.private_key());
+    ReplaceOwn(AuthorityKeyFile(folder), authority.private_key());
   } catch (const fs::filesystem_error& failed) {
     fs::remove_all(fresh, error);
     throw InputError(failed.what());

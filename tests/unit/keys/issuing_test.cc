@@ -81,6 +81,22 @@ std::string CheckNow(const fs::path& folder, const std::string& identity) {
   return Problem([&] { (void)CheckIdentity(folder, identity, false, std::time(nullptr)); });
 }
 
+// The cart runs as the owner of the folder, who cannot read root's files.
+TEST_F(Issuing, WhatRootMakesBelongsToTheOwnerOfTheFolder) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can give files away";
+  constexpr uid_t kNobody = 65534;
+  const auto owner = [](const fs::path& path) {
+    struct stat status {};
+    return ::stat(path.c_str(), &status) == 0 ? status.st_uid : uid_t{0xffffffff};
+  };
+  ASSERT_EQ(::chown(folder_.c_str(), kNobody, kNobody), 0);
+  for (const auto& entry : fs::directory_iterator(folder_)) ::lchown(entry.path().c_str(), kNobody, kNobody);
+  Issue("probe");
+  Revoke(folder_, "probe");
+  for (const auto& entry : fs::directory_iterator(folder_)) EXPECT_EQ(owner(entry.path()), kNobody) << entry.path();
+  EXPECT_EQ(owner(AuthorityKeyFile(folder_)), 0u) << "the private key of the authority stays root's";
+}
+
 TEST_F(Issuing, StoresThePrivateKeyBesideTheFolderAndNotInIt) {
   const fs::path file = scratch_ / "keys.authority";
   EXPECT_EQ(AuthorityKeyFile(folder_), file);
