@@ -13,53 +13,6 @@
 namespace fulcrum::mutation {
 namespace {
 
-/// The source with everything that may not be changed as spaces, so that places stay the same.
-std::string CodeOf(const std::string& source) {
-  std::string code = source;
-  enum class In { kCode, kLine, kBlock, kString, kChar } in = In::kCode;
-  bool directive = false;
-  for (std::size_t i = 0; i < code.size(); ++i) {
-    const char c = source[i], next = i + 1 < source.size() ? source[i + 1] : '\0';
-    const bool line_starts = source.find_last_not_of(" \t", i == 0 ? 0 : i - 1) == std::string::npos || i == 0 ||
-                             source[source.find_last_not_of(" \t", i - 1)] == '\n';
-    if (in == In::kCode && c == '#' && line_starts) directive = true;
-    if (c == '\n') {
-      if (in == In::kLine) in = In::kCode;
-      directive = directive && i > 0 && source[i - 1] == '\\';
-      continue;
-    }
-    const bool hidden = in != In::kCode || directive;
-    switch (in) {
-      case In::kCode:
-        // An apostrophe within a number separates digits.
-        if (c == '/' && next == '/') in = In::kLine;
-        if (c == '/' && next == '*') in = In::kBlock;
-        if (c == '"') in = In::kString;
-        if (c == '\'' && (i == 0 || std::isalnum(static_cast<unsigned char>(source[i - 1])) == 0)) in = In::kChar;
-        if (in != In::kCode || hidden) code[i] = ' ';
-        break;
-      case In::kLine:
-        code[i] = ' ';
-        break;
-      case In::kBlock:
-        code[i] = ' ';
-        if (c == '/' && source[i - 1] == '*') in = In::kCode;
-        break;
-      case In::kString:
-      case In::kChar:
-        code[i] = ' ';
-        if (c == '\\') {
-          if (next != '\n') code[i + 1] = ' ';
-          ++i;
-        } else if (c == (in == In::kString ? '"' : '\'')) {
-          in = In::kCode;
-        }
-        break;
-    }
-  }
-  return code;
-}
-
 std::size_t LineOf(const std::string& text, std::size_t at) {
   return 1 + static_cast<std::size_t>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
 }
@@ -145,6 +98,10 @@ class Finder {
     static const std::regex kCall(R"(\n *((?:[\w]+(?:\.|->))?[A-Z]\w*\([^;{}]*\);)(?=\n))");
     for (const auto& [pattern, kind] : {std::pair(&kSum, "term"), std::pair(&kCall, "call")}) {
       for (std::sregex_iterator match(code_.begin(), code_.end(), *pattern), end; match != end; ++match) {
+        // The line may be the end of a longer expression.
+        const std::size_t before = code_.find_last_not_of(" \n", static_cast<std::size_t>(match->position()));
+        if (before == std::string::npos || std::string_view(";{}):").find(code_[before]) == std::string_view::npos)
+          continue;
         Add(static_cast<std::size_t>(match->position(1)), static_cast<std::size_t>(match->length(1)), kind, ";");
       }
     }
@@ -160,6 +117,52 @@ std::string OneLine(std::string text) {
 }
 
 }  // namespace
+
+std::string CodeOf(const std::string& source) {
+  std::string code = source;
+  enum class In { kCode, kLine, kBlock, kString, kChar } in = In::kCode;
+  bool directive = false;
+  for (std::size_t i = 0; i < code.size(); ++i) {
+    const char c = source[i], next = i + 1 < source.size() ? source[i + 1] : '\0';
+    const bool line_starts = source.find_last_not_of(" \t", i == 0 ? 0 : i - 1) == std::string::npos || i == 0 ||
+                             source[source.find_last_not_of(" \t", i - 1)] == '\n';
+    if (in == In::kCode && c == '#' && line_starts) directive = true;
+    if (c == '\n') {
+      if (in == In::kLine) in = In::kCode;
+      directive = directive && i > 0 && source[i - 1] == '\\';
+      continue;
+    }
+    const bool hidden = in != In::kCode || directive;
+    switch (in) {
+      case In::kCode:
+        // An apostrophe within a number separates digits.
+        if (c == '/' && next == '/') in = In::kLine;
+        if (c == '/' && next == '*') in = In::kBlock;
+        if (c == '"') in = In::kString;
+        if (c == '\'' && (i == 0 || std::isalnum(static_cast<unsigned char>(source[i - 1])) == 0)) in = In::kChar;
+        if (in != In::kCode || hidden) code[i] = ' ';
+        break;
+      case In::kLine:
+        code[i] = ' ';
+        break;
+      case In::kBlock:
+        code[i] = ' ';
+        if (c == '/' && source[i - 1] == '*') in = In::kCode;
+        break;
+      case In::kString:
+      case In::kChar:
+        code[i] = ' ';
+        if (c == '\\') {
+          if (next != '\n') code[i + 1] = ' ';
+          ++i;
+        } else if (c == (in == In::kString ? '"' : '\'')) {
+          in = In::kCode;
+        }
+        break;
+    }
+  }
+  return code;
+}
 
 std::vector<Fault> FaultsOf(const std::string& source) { return Finder(source).All(); }
 

@@ -18,6 +18,9 @@ struct Fault {
 /// and static_assert stay as they are. The list depends on the text alone.
 [[nodiscard]] std::vector<Fault> FaultsOf(const std::string& source);
 
+/// The source with everything that may not be changed as spaces, so that places stay the same.
+[[nodiscard]] std::string CodeOf(const std::string& source);
+
 /// The source with a fault.
 [[nodiscard]] std::string WithFault(const std::string& source, const Fault& fault);
 

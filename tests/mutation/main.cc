@@ -1,5 +1,5 @@
-// mutants FILE           lists the faults that could be made in FILE: `NUMBER LINE KIND OLD -> NEW`, one a line
-// mutants FILE NUMBER    writes FILE with that fault to standard output
+// mutants FILE                    lists the faults that could be made in FILE: `INDEX LINE KIND OLD -> NEW`, one a line
+// mutants FILE INDEX:NUMBER ...   writes FILE with these faults behind switches of these numbers to standard output
 #include <charconv>
 #include <fstream>
 #include <iostream>
@@ -9,10 +9,11 @@
 #include <vector>
 
 #include "tests/mutation/faults.h"
+#include "tests/mutation/switches.h"
 
 int main(int argc, char** argv) {
-  if (argc < 2 || argc > 3) {
-    std::cerr << "usage: mutants FILE [NUMBER]\n";
+  if (argc < 2) {
+    std::cerr << "usage: mutants FILE [INDEX:NUMBER ...]\n";
     return 2;
   }
   std::ifstream file(argv[1]);
@@ -28,13 +29,23 @@ int main(int argc, char** argv) {
     }
     return 0;
   }
-  const std::string_view text = argv[2];
-  std::size_t number = faults.size();
-  std::from_chars(text.data(), text.data() + text.size(), number);
-  if (number >= faults.size()) {
-    std::cerr << "mutants: " << argv[1] << ": no fault " << text << "; valid: 0 to below " << faults.size() << '\n';
-    return 2;
+  std::vector<fulcrum::mutation::Switch> switches;
+  for (int i = 2; i < argc; ++i) {
+    const std::string_view text = argv[i];
+    const std::size_t colon = text.find(':');
+    std::size_t index = faults.size();
+    int number = -1;
+    if (colon != std::string_view::npos) {
+      std::from_chars(text.data(), text.data() + colon, index);
+      std::from_chars(text.data() + colon + 1, text.data() + text.size(), number);
+    }
+    if (index >= faults.size() || number < 0) {
+      std::cerr << "mutants: " << argv[1] << ": no fault and switch " << text
+                << "; valid: INDEX:NUMBER with an index below " << faults.size() << " and a number from 0\n";
+      return 2;
+    }
+    switches.push_back({faults[index], number});
   }
-  std::cout << WithFault(source, faults[number]);
+  std::cout << fulcrum::mutation::WithSwitches(source, switches, argv[1]);
   return 0;
 }
