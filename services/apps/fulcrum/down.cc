@@ -20,7 +20,7 @@ ExitCode Down(const Words& words) {
   // half a minute (services/nodes/app/longest_end.h).
   constexpr auto kPatience = std::chrono::seconds(60);
   const auto begin = std::chrono::steady_clock::now();
-  while (DomainGuard::IsHeld(domain)) {
+  while (DomainGuard::IsTaken(domain)) {  // Also another user's, which the command has reached.
     if (std::chrono::steady_clock::now() - begin > kPatience) {
       throw std::runtime_error("the session has not ended within 60 s; see fulcrum status");
     }

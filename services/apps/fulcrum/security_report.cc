@@ -88,6 +88,9 @@ Line KeysOfCart(const fs::path& file) {
 
 Line Bus(int domain) {
   const std::string what = "bus of the session";
+  if (const std::string other = DomainGuard::OtherUsers(domain); !other.empty()) {
+    return {Mark::kOff, what, other, "run this as its user: only that user can see what protects it"};
+  }
   if (!DomainGuard::IsHeld(domain)) {
     return {Mark::kOff, what, "no session runs in domain " + std::to_string(domain), "nothing to protect now"};
   }

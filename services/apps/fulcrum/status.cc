@@ -17,6 +17,10 @@ ExitCode Status(const Words& words) {
     return ExitCode::kDone;
   }
   const int domain = DomainOf(arguments);
+  if (const std::string other = DomainGuard::OtherUsers(domain); !other.empty()) {
+    std::printf("%s\n", other.c_str());
+    return ExitCode::kFailure;
+  }
   if (!DomainGuard::IsHeld(domain)) {
     std::printf("no session runs in domain %d\n", domain);
     return ExitCode::kFailure;

@@ -20,6 +20,7 @@ ExitCode Top(const Words& words) {
     return ExitCode::kDone;
   }
   const int domain = DomainOf(arguments);
+  if (const std::string other = DomainGuard::OtherUsers(domain); !other.empty()) throw InputError(other);
   if (!DomainGuard::IsHeld(domain)) {
     throw InputError("no session runs in domain " + std::to_string(domain) + "; start one with fulcrum up SCENE");
   }

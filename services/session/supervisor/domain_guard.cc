@@ -85,9 +85,26 @@ std::optional<control::Caller> DomainGuard::Holder(int domain) {
   return holder;
 }
 
+bool DomainGuard::IsTaken(int domain) {
+  const int fd = Connect(domain);
+  if (fd < 0) return errno == EAGAIN;
+  ::close(fd);
+  return true;
+}
+
 bool DomainGuard::IsHeld(int domain) {
   const auto holder = Holder(domain);
-  return holder && holder->uid == ::geteuid();
+  return holder ? holder->uid == ::geteuid() : IsTaken(domain);
+}
+
+std::string DomainGuard::OtherUsers(int domain) {
+  const auto holder = Holder(domain);
+  if (!holder || holder->uid == ::geteuid()) return {};
+  const passwd* user = ::getpwuid(holder->uid);
+  const std::string name = user != nullptr ? user->pw_name : "#" + std::to_string(holder->uid);
+  return "another user's session runs in domain " + std::to_string(domain) + " (" + NameOfUser(holder->uid) + ", pid " +
+         std::to_string(holder->pid) + "): sudo -u " + (user != nullptr ? name : "'" + name + "'") +
+         " fulcrum status --domain " + std::to_string(domain);
 }
 
 }  // namespace fulcrum::supervisor

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "services/transport/control/control_socket.h"
 
@@ -20,11 +21,17 @@ class DomainGuard {
   /// Socket on which members of the cart's group send commands; everyone else is refused there.
   [[nodiscard]] int listening() const { return socket_; }
 
-  /// The process that holds the domain.
+  /// The process that holds the domain; empty also when that cannot be asked (see Connect).
   [[nodiscard]] static std::optional<control::Caller> Holder(int domain);
-  /// True when a supervisor of this user runs in the domain.
+  /// True when a supervisor runs in the domain, whoever runs it.
+  [[nodiscard]] static bool IsTaken(int domain);
+  /// True when a supervisor of this user runs in the domain, or one of which the user is not known.
   [[nodiscard]] static bool IsHeld(int domain);
-  /// Connection to the holder, to be closed by the caller; -1: none holds the domain.
+  /// Where another user's supervisor runs in the domain: one line about it, which says how to ask it for its state.
+  /// Otherwise empty.
+  [[nodiscard]] static std::string OtherUsers(int domain);
+  /// Connection to the holder, to be closed by the caller; -1: none holds the domain, or (errno EAGAIN) its queue of
+  /// connections is full: a session that is ending accepts none.
   [[nodiscard]] static int Connect(int domain);
 
  private:

@@ -54,6 +54,18 @@ TEST(DomainGuard, OneHolderAtATime) {
   EXPECT_EQ(Refusal(kDomain), "");
 }
 
+// A session that is ending accepts no connection, and each look at it is one.
+TEST(DomainGuard, IsHeldHoweverOftenItIsLookedAt) {
+  {
+    const DomainGuard guard(kDomain);
+    for (int i = 0; i < 100; ++i) {
+      ASSERT_TRUE(DomainGuard::IsHeld(kDomain)) << i;
+      ASSERT_TRUE(DomainGuard::IsTaken(kDomain)) << i;
+    }
+  }
+  EXPECT_FALSE(DomainGuard::IsTaken(kDomain));
+}
+
 // Two users' sessions in one domain would mix on the loopback.
 TEST(DomainGuard, AnotherUsersSessionIsRefusedByName) {
   if (::getuid() != 0) GTEST_SKIP() << "only root can become another user";
@@ -64,9 +76,14 @@ TEST(DomainGuard, AnotherUsersSessionIsRefusedByName) {
                                  refusal.find("uid 0, pid ") != std::string::npos &&
                                  refusal.find("host ") != std::string::npos;
               if (!named) std::fprintf(stderr, "%s\n", refusal.c_str());
-              return named && !DomainGuard::IsHeld(kDomain) ? 7 : 1;
+              const std::string line = DomainGuard::OtherUsers(kDomain);
+              const bool told = line.find("(root, uid 0, pid ") != std::string::npos &&
+                                line.find("sudo -u root fulcrum status --domain 99") != std::string::npos;
+              if (!told) std::fprintf(stderr, "%s\n", line.c_str());
+              return named && told && !DomainGuard::IsHeld(kDomain) && DomainGuard::IsTaken(kDomain) ? 7 : 1;
             }),
             7);
+  EXPECT_EQ(DomainGuard::OtherUsers(kDomain), "") << "its own user's";
 }
 
 }  // namespace
