@@ -79,13 +79,21 @@ Port FindByName(const config::SerialLink& link) {
   return Port(port);
 }
 
+Port Find(const config::SerialLink& link) {
+  Port port = FindByIdentity(link);
+  return port ? std::move(port) : FindByName(link);
+}
+
 }  // namespace
 
+std::string PortOf(const config::SerialLink& link) {
+  const Port port = Find(link);
+  const char* name = port ? sp_get_port_name(port.get()) : nullptr;
+  return name != nullptr ? name : "";
+}
+
 std::unique_ptr<ByteSource> SerialPortOpener::Open(int baud) {
-  Port port = FindByIdentity(link_);
-  if (!port) {
-    port = FindByName(link_);
-  }
+  Port port = Find(link_);
   if (!port || sp_open(port.get(), SP_MODE_READ) != SP_OK) {
     return nullptr;
   }

@@ -17,6 +17,7 @@
 #include <sstream>
 #include <thread>
 
+#include "handle_bridge/serial/serial_port.h"
 #include "services/apps/fulcrum/commands.h"
 #include "services/apps/fulcrum/security_report.h"
 #include "services/base/config/cart.h"
@@ -63,7 +64,7 @@ Finding SharedMemory(int domain) {
   }
   const fs::path folder = bus::SharedMemoryDirectory(domain);
   std::error_code error;
-  if (fs::exists(folder, error) && !DomainGuard::IsHeld(domain)) {
+  if (fs::exists(folder, error) && !DomainGuard::IsTaken(domain)) {
     const bus::SweepResult swept = bus::SweepSharedMemory(folder);
     found += "; swept " + std::to_string(swept.files) + " files of dead processes in " + folder.string();
   }
@@ -172,8 +173,22 @@ Finding Display() {
   return {true, "none: pictures are drawn off screen; --window needs an X display (without a monitor: xvfb-run)", ""};
 }
 
-Finding SerialPorts() {
-  std::string found, closed;
+/// Adds what keeps a line of the cart from being opened; empty: nothing, or the cart simulates it.
+void CheckLine(const std::string& key, config::LinkKind kind, const config::SerialLink& link, std::string* missing,
+               std::string* closed) {
+  if (kind != config::LinkKind::kSerial) return;
+  const std::string named = key + (link.port.empty() ? ": the adapter of its USB identity" : ": " + link.port);
+  const std::string port = handle_bridge::PortOf(link);
+  if (port.empty()) {
+    *missing += (missing->empty() ? "" : "; ") + named;
+  } else if (::access(port.c_str(), R_OK | W_OK) != 0 && (*closed + ' ').find(' ' + port + ' ') == std::string::npos) {
+    *closed += ' ' + port;
+  }
+}
+
+/// The serial ports of this machine, and those that the cart names.
+Finding SerialPorts(const config::CartConfig& cart) {
+  std::string found, closed, missing;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator("/dev", error)) {
     const std::string name = entry.path().filename();
@@ -187,16 +202,33 @@ Finding SerialPorts() {
       closed += entry.path().native();
     }
   }
+  bool real = cart.pedal.kind == config::LinkKind::kSerial;
+  for (std::size_t tool = 0; tool < cart.handles.size(); ++tool) {
+    const config::HandleConfig& handle = cart.handles[tool];
+    real = real || handle.kind == config::LinkKind::kSerial;
+    CheckLine("handles.tool" + std::to_string(tool), handle.kind, handle.link, &missing, &closed);
+  }
+  CheckLine("pedal", cart.pedal.kind, cart.pedal.link, &missing, &closed);
+  if (!missing.empty()) {
+    return {false, "not there: " + missing + (closed.empty() ? "" : "; no permission for" + closed),
+            "plug it in, or correct the cart file (ports: ls -l /dev/serial/by-path)"};
+  }
   if (!closed.empty()) {
     return {false, "no permission for" + closed, "sudo usermod -aG dialout $USER, then log in again"};
   }
-  return {true, found.empty() ? "none: handles and pedal are simulated" : "usable:" + found, ""};
+  if (real) return {true, "those of the cart are usable" + (found.empty() ? "" : ":" + found), ""};
+  return {true, found.empty() ? "none, and the cart names none" : "usable:" + found + "; the cart names none", ""};
 }
 
 // haptics_node loads the library by this name. A cart with simulated devices does not need it.
-Finding TouchDriver() {
+Finding TouchDriver(const config::CartConfig& cart) {
   if (::dlopen("libHD.so", RTLD_LAZY | RTLD_LOCAL) != nullptr) return {true, "libHD.so is installed", ""};
-  return {true, "none: a cart with `kind: touch` needs libHD.so (3D Systems: Touch Device Driver, OpenHaptics)", ""};
+  const bool needed = std::ranges::any_of(
+      cart.devices, [](const config::DeviceConfig& device) { return device.kind == config::DeviceKind::kTouch; });
+  return {!needed,
+          needed ? "libHD.so is missing, and the cart has a device of `kind: touch`"
+                 : "none: a cart with `kind: touch` needs libHD.so",
+          "install 3D Systems' Touch Device Driver and OpenHaptics"};
 }
 
 /// True when a UDP socket of this machine is bound to one of the ports that DDS derives from the domain.
@@ -223,6 +255,7 @@ bool PortsInUse(int domain) {
 
 Finding DomainInUse(int domain) {
   const std::string name = "domain " + std::to_string(domain);
+  if (const std::string other = DomainGuard::OtherUsers(domain); !other.empty()) return {true, other, ""};
   if (DomainGuard::IsHeld(domain)) {
     return {true, name + ": a session is running (fulcrum status)", ""};
   }
@@ -264,12 +297,14 @@ Finding Scenes() {
           "install the package again, or build from a whole source tree"};
 }
 
-Finding Cart(const fs::path& cart) {
+/// @param read receives the cart, if the file has no fault.
+Finding Cart(const fs::path& cart, config::CartConfig* read) {
   if (cart.empty()) {
     return {true, "no cart file of this machine: without --cart all hardware is simulated", ""};
   }
   try {
-    return {true, cart.string() + ", \"" + config::LoadCart(cart).name + "\"", ""};
+    *read = config::LoadCart(cart);
+    return {true, cart.string() + ", \"" + read->name + "\"", ""};
   } catch (const InputError& error) {
     return {false, error.what(),
             "correct it, or replace it by a copy of a file in " + (runtime::ShareFolder() / "carts").string()};
@@ -292,7 +327,8 @@ ExitCode Doctor(const Words& words) {
     return ExitCode::kDone;
   }
   // A cart file with a fault is one of the findings.
-  const Finding cart = Cart(CartOf(arguments));
+  config::CartConfig hardware;
+  const Finding cart = Cart(CartOf(arguments), &hardware);
   const int domain = cart.good ? DomainOf(arguments) : DomainOf(arguments, config::DefaultDomain());
   if (arguments.values.count("security") != 0) return ReportSecurity(domain, CartOf(arguments));
   const std::vector<std::pair<const char*, Finding>> findings{
@@ -306,8 +342,8 @@ ExitCode Doctor(const Words& words) {
       {"locked memory", LockedMemory()},
       {"off-screen GL", OffScreenGl()},
       {"display", Display()},
-      {"serial ports", SerialPorts()},
-      {"haptic driver", TouchDriver()},
+      {"serial ports", SerialPorts(hardware)},
+      {"haptic driver", TouchDriver(hardware)},
       {"disk", Disk(arguments.values["out"].as<std::string>())},
   };
   for (const auto& [what, finding] : findings) {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/socket.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -87,6 +88,53 @@ TEST_F(CommandsTest, TheDoctorReadsTheCartFileThatIsGiven) {
   fs::remove(cart_);
   EXPECT_EQ(Run({"doctor", "--out", folder_.string(), "--cart", cart_.string()}), 1);
   EXPECT_TRUE(Said("✗ cart")) << said_;
+}
+
+TEST_F(CommandsTest, TheDoctorNamesTheHardwareOfTheCartThatIsNotThere) {
+  EXPECT_EQ(Run({"doctor", "--out", folder_.string(), "--cart", FULCRUM_SOURCE_DIR "/deploy/carts/lab.yaml"}), 1);
+  EXPECT_TRUE(Said("✗ serial ports")) << said_;
+  for (const char* line : {"handles.tool0: /dev/serial/by-path/pci-0000:00:14.0-usb-0:1:1.0-port0",
+                           "handles.tool1: /dev/serial/by-path/pci-0000:00:14.0-usb-0:2:1.0-port0",
+                           "pedal: /dev/serial/by-path/pci-0000:00:14.0-usb-0:3:1.0-port0"}) {
+    EXPECT_TRUE(Said(line)) << line << "\n" << said_;
+  }
+  (void)Run({"doctor", "--out", folder_.string(), "--cart", FULCRUM_SOURCE_DIR "/deploy/carts/touch.yaml"});
+  EXPECT_TRUE(Said("✗ haptic driver       libHD.so is missing") || Said("libHD.so is installed")) << said_;
+  (void)Run({"doctor", "--out", folder_.string(), "--cart", cart_.string()});
+  EXPECT_TRUE(Said("✓ serial ports")) << said_;
+  EXPECT_TRUE(Said("✓ haptic driver")) << said_;
+}
+
+// The services run as another user than the technician.
+TEST_F(CommandsTest, AnotherUsersSessionIsNamed) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can become another user";
+  constexpr int kOtherDomain = 82;
+  constexpr uid_t kNobody = 65534;
+  int ready[2];
+  ASSERT_EQ(::pipe(ready), 0);
+  const pid_t holder = ::fork();
+  if (holder == 0) {
+    if (::setresuid(kNobody, kNobody, kNobody) != 0) ::_exit(1);
+    const DomainGuard guard(kOtherDomain);
+    (void)!::write(ready[1], "x", 1);
+    for (;;) ::pause();
+  }
+  char byte = 0;
+  ASSERT_EQ(::read(ready[0], &byte, 1), 1);
+  const std::string pid = "pid " + std::to_string(holder) + "): sudo -u ";
+  for (const Words& words : {Words{"status"}, Words{"top"}, Words{"doctor", "--out", folder_.string()}}) {
+    Words all = words;
+    all.insert(all.end(), {"--domain", std::to_string(kOtherDomain)});
+    const int code = Run(all);
+    EXPECT_TRUE(Said("another user's session runs in domain 82 (")) << words[0] << ": " << said_;
+    EXPECT_TRUE(Said(pid)) << words[0] << ": " << said_;
+    EXPECT_TRUE(code != 0 || words[0] == "doctor") << words[0];
+    EXPECT_FALSE(Said("✗ domain")) << said_;
+  }
+  ::kill(holder, SIGKILL);
+  ::waitpid(holder, nullptr, 0);
+  ::close(ready[0]);
+  ::close(ready[1]);
 }
 
 TEST_F(CommandsTest, TheDoctorJudgesSocketsAsTheBusMakesThem) {
