@@ -22,7 +22,7 @@ constexpr const char* kUsage =
        fulcrum scene preview SCENE [--out FILE.png] [--data DIR]
        fulcrum scene explain KEY
        fulcrum scene schema
-       fulcrum scene list
+       fulcrum scene list [DIR]
        fulcrum scene materials [SCENE]
 
 new        writes NAME.yaml around a mesh of an organ, with membrane, tools, scope and a script that grasps and
@@ -31,7 +31,7 @@ check      reads and builds a scene without writing it, and prints its size and 
 preview    draws a scene from four sides
 explain    prints a key's default and valid values; every key that contains the text
 schema     prints a JSON Schema of the keys, for an editor that completes and checks YAML
-list       lists the shipped scenes
+list       lists the shipped scenes, or those described in DIR
 materials  lists the materials of bodies and sheets with their source, with those beside SCENE
 
 Examples:
@@ -164,7 +164,8 @@ ExitCode Scene(const Words& words) {
     if (words.size() < 2) throw InputError("scene " + what + " needs " + name + "; see fulcrum scene --help");
     return words[1];
   };
-  Words rest(words.begin() + std::min<std::ptrdiff_t>(2, std::ssize(words)), words.end());
+  const std::ptrdiff_t own_words = what == "list" ? 1 : 2;
+  Words rest(words.begin() + std::min(own_words, std::ssize(words)), words.end());
   Words command{"scene_compiler"};
   if (what == "new") {
     command.insert(command.end(), {"--new", needs("NAME")});

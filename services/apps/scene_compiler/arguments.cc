@@ -1,6 +1,8 @@
 #include "services/apps/scene_compiler/arguments.h"
 
+#include <algorithm>
 #include <charconv>
+#include <vector>
 
 #include "services/base/core/error.h"
 
@@ -59,12 +61,64 @@ double Seconds(const std::string& text) {
   return seconds;
 }
 
+/// Options that choose what is done; without any a description is compiled.
+const std::vector<std::string> kKinds{"--new", "--anatomy", "--info", "--source", "--list"};
+const std::string kCompiling = "SCENE.yaml";
+
+/// What reads an option. --quiet and --help go with all.
+struct OptionKinds {
+  std::string option;
+  std::vector<std::string> kinds;
+};
+const std::vector<OptionKinds> kOptionKinds{{"--out", {kCompiling, "--new", "--anatomy"}},
+                                            {"--data", {kCompiling}},
+                                            {"--set", {kCompiling}},
+                                            {"--check", {kCompiling}},
+                                            {"--preview", {kCompiling, "--info"}},
+                                            {"--limit", {kCompiling, "--new", "--anatomy"}},
+                                            {"--from", {"--new"}},
+                                            {"--unit", {"--new"}},
+                                            {"--at", {"--new"}},
+                                            {"--facing", {"--new"}},
+                                            {"--map", {"--anatomy"}}};
+
+bool Contains(const std::vector<std::string>& list, const std::string& text) {
+  return std::ranges::find(list, text) != list.end();
+}
+
+/// Throws InputError for a word of the command line that would be dropped. @param given its options.
+void RefuseForeignOptions(const std::vector<std::string>& given, const std::vector<std::string>& plain) {
+  std::string kind = kCompiling;
+  for (const std::string& option : kKinds) {
+    if (!Contains(given, option)) continue;
+    if (kind != kCompiling) throw InputError(kind + " cannot be combined with " + option);
+    kind = option;
+  }
+  for (const auto& [option, kinds] : kOptionKinds) {
+    if (!Contains(given, option) || Contains(kinds, kind)) continue;
+    std::string problem = option + " cannot be combined with " + kind + "; it goes with";
+    for (const std::string& other : kinds) problem += (other == kinds.front() ? " " : ", ") + other;
+    throw InputError(problem);
+  }
+  if (Contains(given, "--check") && Contains(given, "--out")) {
+    throw InputError("--check writes no scene: leave out --out, or leave out --check");
+  }
+  if (kind == "--anatomy" && Contains(given, "--out") && !Contains(given, "--map")) {
+    throw InputError("--out goes with --map: without a map, one to be edited is printed and nothing is written");
+  }
+  const std::size_t most = kind == kCompiling || kind == "--list" ? 1 : 0;
+  if (plain.size() > most) {
+    throw InputError("'" + plain[most] + "' is one word too many; see --help");
+  }
+}
+
 }  // namespace
 
 const char* Usage() { return kUsage; }
 
 Arguments ParseArguments(const std::vector<std::string>& words) {
   Arguments arguments;
+  std::vector<std::string> given;
   for (std::size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
     const auto value = [&] {
@@ -73,6 +127,7 @@ Arguments ParseArguments(const std::vector<std::string>& words) {
       }
       return words[++i];
     };
+    if (word.starts_with("-")) given.push_back(word);
     if (word == "--help" || word == "-h") {
       arguments.help = true;
     } else if (word == "--out") {
@@ -115,6 +170,7 @@ Arguments ParseArguments(const std::vector<std::string>& words) {
       arguments.plain.push_back(word);
     }
   }
+  if (!arguments.help) RefuseForeignOptions(given, arguments.plain);
   return arguments;
 }
 

@@ -16,7 +16,8 @@ struct Arguments {
   bool list = false, check = false, quiet = false, help = false;
 };
 
-/// Parses the command line. Throws InputError on an unknown option or a missing value.
+/// Parses the command line. Throws InputError on an unknown option, a missing value, or an option that would have no
+/// effect beside the others.
 [[nodiscard]] Arguments ParseArguments(const std::vector<std::string>& words);
 
 /// Text of --help.

@@ -78,6 +78,47 @@ TEST_F(CommandsTest, AHostWaitsInTheDomainOfItsCartFile) {
   host.End(SIGTERM);
 }
 
+TEST_F(CommandsTest, OptionsOfTheLinkNeedAPeer) {
+  for (const Words& option : {Words{"--address", "127.0.0.1"}, Words{"--link-domain", "120"}, Words{"--insecure-link"},
+                              Words{"--keys", folder_.string()}}) {
+    Words words{"up", "small", "--seconds", "0.1", "--out", folder_.string(), "--cart", cart_.string()};
+    words.insert(words.end(), option.begin(), option.end());
+    EXPECT_EQ(Run(words), 2);
+    EXPECT_TRUE(Said(option[0] + " is about the link to another host and goes with --peer")) << said_;
+  }
+}
+
+TEST_F(CommandsTest, WhatASceneCommandWouldDropIsRefused) {
+  const std::string yaml = folder_ / "s.yaml", out = folder_ / "s.fulcrum";
+  const struct {
+    Words words;
+    const char* expected;
+  } cases[] = {
+      {{"scene", "new", "l", "--from", "l.obj", "--set", "physics.grip_force_N=3"},
+       "--set cannot be combined with --new"},
+      {{"scene", "new", "l", "--from", "l.obj", "--check"}, "--check cannot be combined with --new"},
+      {{"scene", "new", "l", "--from", "l.obj", "--data", "d"}, "--data cannot be combined with --new"},
+      {{"scene", "new", "l", "--from", "l.obj", "--preview", "p.png"}, "--preview cannot be combined with --new"},
+      {{"scene", "check", "small", "--out", out}, "--check writes no scene"},
+      {{"scene", "check", "small", "--unit", "mm"}, "--unit cannot be combined with SCENE.yaml; it goes with --new"},
+      {{"scene", "check", "small", "large"}, "'large' is one word too many"},
+      {{"import-anatomy", "l.nii", "--out", "d"}, "--out goes with --map"},
+      {{"import-anatomy", "l.nii", "--set", "physics.grip_force_N=3"}, "--set cannot be combined with --anatomy"},
+      {{"import-anatomy", "l.nii", "--at", "1,2,3"}, "--at cannot be combined with --anatomy"},
+      {{"import-anatomy", "l.nii", "m.nii"}, "'m.nii' is one word too many"},
+  };
+  for (const auto& [words, expected] : cases) {
+    EXPECT_EQ(Run(words), 2) << expected;
+    EXPECT_TRUE(Said(expected)) << expected << '\n' << said_;
+  }
+  EXPECT_EQ(Run({"--info", out, "--set", "a.b=1"}, "scene_compiler"), 2);
+  EXPECT_TRUE(Said("--set cannot be combined with --info")) << said_;
+  EXPECT_EQ(Run({"--info", out, "--source", out}, "scene_compiler"), 2);
+  EXPECT_TRUE(Said("--info cannot be combined with --source")) << said_;
+  EXPECT_FALSE(fs::exists(out));
+  EXPECT_EQ(Run({"scene", "list", folder_.string()}), 0) << "a folder without a scene";
+}
+
 TEST_F(CommandsTest, TheDoctorReadsTheCartFileThatIsGiven) {
   (void)Run({"doctor", "--out", folder_.string(), "--cart", cart_.string()});
   EXPECT_TRUE(Said("✓ cart                " + cart_.string() + ", \"bench\"")) << said_;
