@@ -140,7 +140,7 @@ ExitCode Up(const Words& words) {
   if (values.count("peer") != values.count("remote")) {
     throw InputError("--peer and --remote must be given together: the host, and the nodes that run there");
   }
-  for (const char* option : {"keys", "insecure-link"}) {
+  for (const char* option : {"keys", "insecure-link", "address", "link-domain"}) {
     if (values.count(option) != 0 && values.count("peer") == 0) {
       throw InputError(std::string("--") + option + " is about the link to another host and goes with --peer");
     }
