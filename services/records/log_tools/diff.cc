@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <optional>
 #include <ostream>
 #include <tuple>
@@ -123,6 +124,17 @@ Count Compare(const std::map<std::uint32_t, std::uint64_t>& first,
   return count;
 }
 
+bool HasNode(const Digest& digest, const std::string& node) {
+  return std::ranges::any_of(digest, [&](const auto& known) { return known.first.node == node; });
+}
+
+/// Streams of `other` that `own` lacks, although the same node has sent others there. A node that is not in `own` at
+/// all was not part of that session.
+bool LacksStream(const Digest& own, const Digest& other) {
+  return std::ranges::any_of(
+      other, [&](const auto& known) { return !own.contains(known.first) && HasNode(own, known.first.node); });
+}
+
 }  // namespace
 
 ExitCode Diff(const std::filesystem::path& first, const std::filesystem::path& second, const Filter& filter,
@@ -130,10 +142,12 @@ ExitCode Diff(const std::filesystem::path& first, const std::filesystem::path& s
   CheckTopics(filter);
   const Digest a = MakeDigest(first, filter, without);
   Digest b = MakeDigest(second, filter, without);
-  bool same = true;
+  bool same = !LacksStream(a, b) && !LacksStream(b, a);
+  std::uint64_t compared = 0;
   for (const auto& known : a) {
     const Stream& stream = known.first;
     const Count count = Compare(known.second, b[stream]);
+    compared += count.common;
     *out << stream << ": " << count.common << " in both, " << count.different << " different, " << count.only_first
          << " only in the first, " << count.only_second << " only in the second\n";
     b.erase(stream);
@@ -159,6 +173,12 @@ ExitCode Diff(const std::filesystem::path& first, const std::filesystem::path& s
     }
   }
   for (const auto& [stream, samples] : b) *out << stream << ": only in the second, " << samples.size() << '\n';
+  if (compared == 0) {
+    throw InputError(
+        "nothing to compare: " + first.string() + " and " + second.string() +
+        " have no message of the same topic, node and sequence; give other times or topics, or two recordings "
+        "of the same session or script");
+  }
   *out << (same ? "no difference in the messages of both\n" : "");
   return same ? ExitCode::kDone : ExitCode::kFailure;
 }

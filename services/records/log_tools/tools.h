@@ -32,8 +32,9 @@ std::vector<std::filesystem::path> ExportTables(const std::filesystem::path& fil
 ExitCode Verify(const std::filesystem::path& file, std::ostream* out);
 
 /// Prints the first difference of each topic and node. Messages are paired by their writer's sequence; those that
-/// cannot be decoded are compared by their bytes. @param without a field that is skipped, for example "stamp". kFailure
-/// if there is a difference.
+/// cannot be decoded are compared by their bytes. A topic of a node that one file lacks wholly, while it has others of
+/// that node, is a difference. @param without a field that is skipped, for example "stamp". kFailure if there is a
+/// difference. Throws InputError if the files have no message in common.
 ExitCode Diff(const std::filesystem::path& first, const std::filesystem::path& second, const Filter& filter,
               const std::string& without, std::ostream* out);
 

@@ -258,6 +258,50 @@ TEST_F(LogTools, DiffNamesTheFirstFieldThatDiffers) {
   EXPECT_EQ(Diff(a, other, {{"Health"}}, "", &out), ExitCode::kDone) << "only the requested topics are compared";
 }
 
+/// Health #1 of each node, and so many ThermalEvents of thermal_node.
+fs::path MakeWithEvents(const fs::path& file, const std::vector<std::string>& nodes, std::uint32_t events) {
+  recording::McapWriter writer(file, "fulcrum", "fulcrum test");
+  const auto write = [&](std::uint16_t channel, std::uint32_t sequence, const auto& message) {
+    std::vector<std::uint8_t> bytes;
+    EXPECT_TRUE(bus::EncodeCdr(message, &bytes));
+    const std::uint64_t time = kBegin_ns + sequence * kStep_ns;
+    writer.Write(channel, sequence, time, time, std::as_bytes(std::span(bytes)));
+  };
+  for (const std::string& node : nodes) {
+    write(writer.AddChannel(0, bus::RoleOf<Health>().name, "cdr", {{"node", node}}), 1, bus::test::Sample<Health>());
+  }
+  if (events == 0) return file;
+  const std::uint16_t channel =
+      writer.AddChannel(0, bus::RoleOf<ThermalEvent>().name, "cdr", {{"node", "thermal_node"}});
+  for (std::uint32_t i = 1; i <= events; ++i) write(channel, i, bus::test::Sample<ThermalEvent>());
+  return file;
+}
+
+TEST_F(LogTools, DiffFindsAStreamThatOneSideLacks) {
+  const fs::path with = MakeWithEvents(folder_ / "a.mcap", {"physics_node", "thermal_node"}, 3);
+  const fs::path silent = MakeWithEvents(folder_ / "b.mcap", {"physics_node", "thermal_node"}, 0);
+  const fs::path without = MakeWithEvents(folder_ / "c.mcap", {"physics_node"}, 0);
+  std::ostringstream out;
+  EXPECT_EQ(Diff(with, silent, {}, "", &out), ExitCode::kFailure) << "thermal_node published no event";
+  EXPECT_EQ(Diff(silent, with, {}, "", &out), ExitCode::kFailure);
+  EXPECT_EQ(Diff(with, without, {}, "", &out), ExitCode::kDone) << "a session without thermal_node";
+}
+
+TEST_F(LogTools, DiffOfNothingIsNoAgreement) {
+  const fs::path a = MakeWithEvents(folder_ / "a.mcap", {"physics_node"}, 0);
+  const fs::path b = MakeWithEvents(folder_ / "b.mcap", {"thermal_node"}, 0);
+  std::ostringstream out;
+  for (const auto& [filter, second] : std::vector<std::pair<Filter, fs::path>>{
+           {{}, b}, {{{"OperatorInput"}}, a}, {{.topics = {}, .from_s = 1000}, a}}) {
+    try {
+      (void)Diff(a, second, filter, "", &out);
+      ADD_FAILURE() << out.str();
+    } catch (const InputError& error) {
+      EXPECT_EQ(std::string(error.what()).find("nothing to compare: "), 0u) << error.what();
+    }
+  }
+}
+
 /// Three ToolStates of another layout: all bytes behind the head have this value.
 fs::path MakeUndecodable(const fs::path& file, std::uint8_t value, const std::string& schema_hash) {
   recording::McapWriter writer(file, "fulcrum", "fulcrum 0.0.9");
