@@ -41,6 +41,14 @@ double FigureOf(const std::string& summary, const std::string& key) {
   return at == std::string::npos ? std::nan("") : std::atof(summary.c_str() + at + key.size() + 4);
 }
 
+std::string FaultBesidePace(int code, const std::string& said) {
+  if (code == 0) return {};
+  const std::string faults = FaultsButPace(said);
+  const bool slow =
+      code == static_cast<int>(ExitCode::kFailure) && faults.empty() && said.find("\nfault at ") != std::string::npos;
+  return slow ? std::string() : "exit code " + std::to_string(code) + "\n" + faults + said;
+}
+
 std::optional<double> CpuSeconds(pid_t pid) {
   const std::string line = ReadFile("/proc/" + std::to_string(pid) + "/stat");
   const std::size_t name_end = line.rfind(')');
@@ -109,13 +117,7 @@ std::optional<int> Cart::WaitForEnd(double limit_s) {
 
 std::string Cart::FaultAtEnd(double limit_s) {
   const std::optional<int> code = WaitForEnd(limit_s);
-  const std::string said = Said();
-  if (!code) return "it does not end\n" + said;
-  if (*code == 0) return {};
-  const std::string faults = FaultsButPace(said);
-  const bool slow =
-      *code == static_cast<int>(ExitCode::kFailure) && faults.empty() && said.find("\nfault at ") != std::string::npos;
-  return slow ? std::string() : "exit code " + std::to_string(*code) + "\n" + faults + said;
+  return code ? FaultBesidePace(*code, Said()) : "it does not end\n" + Said();
 }
 
 }  // namespace fulcrum::testing

@@ -22,6 +22,12 @@ bool WaitFor(double limit_s, const std::function<bool()>& done);
 /// Number under `key` in a summary.json; NaN: it is missing.
 [[nodiscard]] double FigureOf(const std::string& summary, const std::string& key);
 
+/// Empty for a session that found no fault but, at most, nodes that this machine is too slow for. Otherwise its faults
+/// and all that it printed.
+/// @param code exit code of `fulcrum up`, or minus the signal that ended it.
+/// @param said all that it printed.
+[[nodiscard]] std::string FaultBesidePace(int code, const std::string& said);
+
 /// Running child processes of a process, by name.
 [[nodiscard]] std::map<std::string, pid_t> ChildrenOf(pid_t parent);
 
@@ -49,8 +55,7 @@ class Cart {
   void Signal(int signal) const { up_.Signal(signal); }
   /// Exit code of `fulcrum up`, or minus the signal; no value if it does not end within the limit.
   [[nodiscard]] std::optional<int> WaitForEnd(double limit_s);
-  /// Waits for the end. Empty: `fulcrum up` ended by itself and found no fault but, at most, nodes that this machine is
-  /// too slow for. Otherwise the faults and all that it printed.
+  /// Waits for the end, which must come by itself; then FaultBesidePace of this session.
   [[nodiscard]] std::string FaultAtEnd(double limit_s);
 
  private:

@@ -168,6 +168,14 @@ TEST_F(VerdictTest, FaultsOfPaceAreToldFromOthers) {
   EXPECT_FALSE(testing::IsOfPace("fault at 9.0 s: physics_node missed 80 % of its periods; at most 15 % are allowed"));
   verdict_.Fail(5, ExitCode::kFailure, "the recorder lost samples");
   EXPECT_EQ(testing::FaultsButPace(said()), "fault at 5.0 s: the recorder lost samples\n");
+  EXPECT_EQ(testing::FaultsButPace("recording: /r.mcap, 3 samples lost\n" + said()), "");
+  EXPECT_EQ(testing::FaultsButPace("recording: /r.mcap, 11 samples lost\n" + said()),
+            "fault at 5.0 s: the recorder lost samples\n");
+  EXPECT_TRUE(testing::IsOfPace("fault at 8.5 s: render_node did not run again within 5 s"));
+  EXPECT_FALSE(testing::IsOfPace("fault at 8.5 s: thermal_node did not run again within 5 s"));
+  const std::string died = "fault at 9.0 s: render_node died 4 times, of which 3 are allowed: ";
+  EXPECT_TRUE(testing::IsOfPace(died + "was stuck in a step for too long and was killed"));
+  EXPECT_FALSE(testing::IsOfPace(died + "killed by signal 11 (Segmentation fault)"));
 }
 
 TEST_F(VerdictTest, AMomentOfLoadIsNoFault) {
