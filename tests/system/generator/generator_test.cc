@@ -56,10 +56,11 @@ TEST(GeneratorOfTheCart, IsTurnedDuringACutAndTheReplayComesToTheSameStates) {
     const Said turned = Generator({"--cut", "50", "--coag", "25"});
     EXPECT_EQ(turned.exit_code, 0) << turned.text;
     EXPECT_NE(turned.text.find("cut 50 W, coag 25 W"), std::string::npos) << turned.text;
-    EXPECT_TRUE(watch.WaitUntil(5, [](const CartState& state) { return Sets(state, 50); }))
+    EXPECT_TRUE(watch.WaitUntil(kPatience_s, [](const CartState& state) { return Sets(state, 50); }))
         << "the command takes effect during the first line";
-    EXPECT_TRUE(watch.WaitUntil(
-        5, [](const CartState& state) { return state.Metric(NodeId::kSupervisor, "generator_coag_W") == 25; }));
+    EXPECT_TRUE(watch.WaitUntil(kPatience_s, [](const CartState& state) {
+      return state.Metric(NodeId::kSupervisor, "generator_coag_W") == 25;
+    }));
 
     const Said wrong = Generator({"--cut", "500"});
     EXPECT_NE(wrong.exit_code, 0);
