@@ -262,6 +262,8 @@ TEST(HandlePty, UnpluggedHandleHoldsAndIsFoundAgainUnderAnotherName) {
   for (int round = 1; round <= 3; ++round) {
     chain.SetFaults(0, {.unplugged = true});
     EXPECT_TRUE(chain.WaitForError("handle 0: no-port"));
+    // The error may be newer than the state that was taken with it.
+    EXPECT_TRUE(chain.WaitFor([](const HandleState& s) { return s.handles[0].quality == 0.0f; }));
     const float held = chain.state.handles[0].jaw_angle_rad;
     EXPECT_TRUE(chain.WaitFor([](const HandleState&) { return true; }));
     EXPECT_EQ(chain.state.handles[0].jaw_angle_rad, held);

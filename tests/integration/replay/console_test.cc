@@ -12,10 +12,12 @@
 #include <filesystem>
 #include <iterator>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "tests/integration/replay/short_session.h"
+#include "tests/support/cart.h"
 #include "tests/support/program.h"
 
 namespace fulcrum::replay {
@@ -51,7 +53,7 @@ class Typed {
   [[nodiscard]] pid_t pid() const { return pid_; }
   /// Exit code, or minus the signal; what it printed is in `said`. A replay that is silent for long is ended.
   int End(std::string* said) {
-    constexpr int kLongestSilence_ms = 20'000;
+    constexpr int kLongestSilence_ms = 60'000;
     std::array<char, 1024> part{};
     for (;;) {
       pollfd printed{terminal_, POLLIN, 0};
@@ -90,11 +92,10 @@ class ConsoleTest : public ::testing::Test {
   };
   static Answer Ask(const std::string& commands, const std::string& into = "physics") {
     fulcrum::testing::Program program("replayer", {session_->recording(), "--into", into, "--console"}, commands);
-    for (int i = 0; i < 600; ++i) {
-      if (const auto code = program.Poll()) return {program.Said(), *code};
-      ::usleep(50'000);
-    }
-    return {program.Said(), -1};
+    constexpr double kPatience_s = 120;
+    std::optional<int> code;
+    (void)fulcrum::testing::WaitFor(kPatience_s, [&] { return (code = program.Poll()).has_value(); });
+    return {program.Said(), code.value_or(-1)};
   }
 
   static std::unique_ptr<testing::ShortSession> session_;

@@ -129,6 +129,21 @@ class SupervisorTest : public ::testing::Test {
     }
     return pids;
   }
+  /// Waits until the supervisor has received a Health "running" of another process of `node` than `killed`.
+  static bool SupervisorHasHeard(NodeId node, pid_t killed) {
+    bus::DdsParticipant bus(testing::ReaderOf(kDomain));
+    const auto healths = bus.MakeInput<Health>();
+    Health health;
+    bool runs = false;
+    int turns = 0;  // Of the supervisor, with a Health of its own each, since this test has heard the node.
+    return WaitUntil([&] {
+      while (healths->TakeNext(&health)) {
+        runs |= health.node == node && health.pid != killed && health.state == HealthState::kRunning;
+        turns += runs && health.node == NodeId::kSupervisor ? 1 : 0;
+      }
+      return turns >= 3;
+    });
+  }
   static std::vector<std::string> SharedMemory() {
     std::vector<std::string> names;
     std::error_code error;
@@ -142,9 +157,15 @@ class SupervisorTest : public ::testing::Test {
     return names;
   }
 
-  /// Publishes in place of haptics and physics: tool 0 moves in a circle at 40 mm/s, tool 1 presses with 12.5 N.
-  static runtime::ProcessEnd PublishMotion(runtime::ChildProcess* until_end) {
+  struct Motion {
+    runtime::ProcessEnd end;
+    double seconds = 0;  ///< From the first sample of the session that had a reader to the last.
+  };
+  /// Publishes in place of haptics and physics: tool 0 moves in a circle at 40 mm/s, tool 1 presses with 12.5 N. Ends
+  /// the session when it has been read for 2.5 s.
+  static Motion PublishMotion(runtime::ChildProcess* session) {
     bus::DdsParticipant bus(testing::WriterOf(kDomain, "hands"));
+    const auto manifests = bus.MakeInput<SceneManifest>();
     const auto tools = bus.MakeOutput<ToolState>();
     const auto models = bus.MakeOutput<ContactModel>();
     bus::Stamper tool_stamper(runtime::MonotonicNs()), model_stamper(runtime::MonotonicNs());
@@ -154,11 +175,22 @@ class SupervisorTest : public ::testing::Test {
     model.devices[1].count = 1;
     model.devices[1].contacts[0].kind = ContactKind::kSurface;
     model.devices[1].contacts[0].f_ref = Vec3f(0, 0, 12.5f);
+    SceneManifest manifest;
+    std::int64_t begin_ns = 0, last_ns = 0;
+    bool ending = false;
     for (;;) {
-      if (const auto end = until_end->Poll()) {
-        return *end;
+      if (const auto end = session->Poll()) {
+        return {*end, 1e-9 * static_cast<double>(last_ns - begin_ns)};
       }
       const std::int64_t now = runtime::MonotonicNs();
+      (void)manifests->TakeLatest(&manifest);
+      const bool is_read = manifest.session_start_ns != 0 && now > manifest.session_start_ns && tools->has_readers();
+      if (begin_ns == 0 && is_read) begin_ns = now;
+      if (begin_ns != 0 && !ending) last_ns = now;
+      if (begin_ns != 0 && !ending && now - begin_ns > 2'500'000'000) {
+        session->Signal(SIGINT);
+        ending = true;
+      }
       const double angle = 1e-9 * static_cast<double>(now % 1'000'000'000'000) * 0.040 / 0.020;
       tool.stamp = tool_stamper.Next(now);
       tool.tools[0].p_WT = 0.020f * Vec3f(static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)), 0);
@@ -196,7 +228,7 @@ TEST_F(SupervisorTest, KilledNodeIsRestartedRejoinsAndTheRunEndsWell) {
   ASSERT_EQ(pids.size(), 1u);
   ::kill(pids[0], SIGKILL);
   ASSERT_TRUE(WaitUntil([&] { return Joined(NodeId::kPhysics, 2); })) << Log();
-  std::this_thread::sleep_for(300ms);  // A Health "running" may still be in transit to the supervisor.
+  EXPECT_TRUE(SupervisorHasHeard(NodeId::kPhysics, pids[0]));
   up.Signal(SIGINT);
   EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
   EXPECT_NE(Log().find("physics_node killed by signal 9"), std::string::npos) << Log();
@@ -298,10 +330,13 @@ TEST_F(SupervisorTest, StatusRestartAndDownReachTheSupervisor) {
 TEST_F(SupervisorTest, ADegradedNodeHasTheNewestPastDumpedOnce) {
   fs::copy_file(fs::path(FULCRUM_BIN_DIR) / "recorder", folder_ / "bin" / "recorder");
   Order(NodeId::kThermal, "flicker");
-  runtime::ChildProcess up = Up({"--seconds", "1.5", "--keep-last", "30"});
+  runtime::ChildProcess up = Up({"--seconds", "120", "--keep-last", "30"});
+  const std::string dumped = "dump.mcap: thermal_node is degraded: a plug is loose";
+  EXPECT_TRUE(WaitUntil([&] { return Count(NodeLog(NodeId::kRecorder), dumped) > 0; })) << NodeLog(NodeId::kRecorder);
+  std::this_thread::sleep_for(1s);  // It degrades five times more.
+  up.Signal(SIGINT);
   EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
-  EXPECT_EQ(Count(NodeLog(NodeId::kRecorder), "dump.mcap: thermal_node is degraded: a plug is loose"), 1u)
-      << NodeLog(NodeId::kRecorder);
+  EXPECT_EQ(Count(NodeLog(NodeId::kRecorder), dumped), 1u) << NodeLog(NodeId::kRecorder);
   EXPECT_TRUE(fs::exists(Session() / "dump.mcap"));
   EXPECT_FALSE(fs::exists(Session() / "dump-2.mcap"))
       << "it recovered and degraded again within the 30 s after the first dump";
@@ -393,18 +428,19 @@ TEST_F(SupervisorTest, AssessedSessionIsScoredAndRemembered) {
   scene::SceneData data = TinyScene(1u << static_cast<unsigned>(NodeId::kPhysics));
   data.fixed.assessment.on = 1;
   scene::WriteSceneFile(data, "name: tiny\n", scene_);
-  runtime::ChildProcess up = Up({"--seconds", "3", "--trainee", "Ann", "--database", database});
-  EXPECT_EQ(PublishMotion(&up).exit_code, 0) << Log();
+  runtime::ChildProcess up = Up({"--seconds", "120", "--trainee", "Ann", "--database", database});
+  const Motion motion = PublishMotion(&up);
+  EXPECT_EQ(motion.end.exit_code, 0) << Log();
   EXPECT_NE(Log().find("! force too high · score "), std::string::npos) << Log();
   const std::string json = ReadAll(Session() / "assessment.json");
   EXPECT_NE(json.find("\"peak_force_N\": 12.5,"), std::string::npos) << json;
   EXPECT_NE(json.find("\"peak_force_N.passed\": false"), std::string::npos) << json;
   const std::size_t path = json.find("\"path_length_mm\": ");
   ASSERT_NE(path, std::string::npos) << json;
-  // 40 mm/s from the time at which discovery has completed.
+  // 40 mm/s, between the time at which discovery has completed on both sides and the end of the session.
   const double path_mm = std::stod(json.substr(path + 18));
-  EXPECT_GT(path_mm, 60);
-  EXPECT_LT(path_mm, 125);
+  EXPECT_GT(path_mm, 0.6 * 40 * motion.seconds);
+  EXPECT_LT(path_mm, 1.25 * 40 * motion.seconds);
   EXPECT_NE(ReadAll(Session() / "assessment.json").find("\"trainee\": \"Ann\""), std::string::npos);
   EXPECT_NE(ReadAll(Session() / "report.html").find("Score sheet of Ann"), std::string::npos);
   EXPECT_NE(ReadAll(Session() / "summary.json").find("\"score_pct\": "), std::string::npos);
