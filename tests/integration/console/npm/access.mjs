@@ -108,7 +108,7 @@ async function byKeyboard({address, newPage}) {
   await tabTo(page, 'stop-yes');
   await keyboard.press('Enter');
 
-  await page.waitForSelector('#attempt-box[open]', {timeout: 40_000});
+  await page.waitForSelector('#attempt-box[open]');
   await until(page, 20, shown, 'own');
   await until(page, 20, shown, 'expert');
   await until(page, 20, () => document.getElementById('film-own').dataset.time && document.getElementById('film-expert').dataset.time);
@@ -129,8 +129,7 @@ async function byKeyboard({address, newPage}) {
   expect(await page.evaluate(() => document.activeElement.getAttribute('aria-current')) === 'time', 'the event of the present time is marked');
   await tabTo(page, 'play', 'Shift+Tab');
   await keyboard.press('Enter');
-  await rest(600);
-  expect(await scrubTime(page) > at, `Play plays from ${at} s, but the slider is at ${await scrubTime(page)} s`);
+  await until(page, 5, from => Number(document.getElementById('scrub').value) > from, at);
   await keyboard.press('Escape');
   await until(page, 5, () => document.activeElement.dataset.session);
 
@@ -185,7 +184,7 @@ async function byTouch({address, newPage}) {
   await page.tap('#stop');
   await page.tap('#stop-yes');
 
-  await page.waitForSelector('#attempt-box[open]', {timeout: 40_000});
+  await page.waitForSelector('#attempt-box[open]');
   await until(page, 20, shown, 'own');
   const path = await page.evaluate(() => [...document.querySelectorAll('#sheet tr')].find(row => row.textContent.startsWith('path')).cells[1].textContent);
   expect(Number(path) > 5, `the fingers have moved the tool, but by ${path} mm`);
@@ -194,9 +193,8 @@ async function byTouch({address, newPage}) {
   await pedal.tap();
   expect(Math.abs(await scrubTime(page) - at) <= 0.06, `a tap jumps to the event at ${at} s, but to ${await scrubTime(page)} s`);
   await page.tap('#play');
-  await rest(600);
+  await until(page, 5, from => Number(document.getElementById('scrub').value) > from, at);
   await page.tap('#play');
-  expect(await scrubTime(page) > at, `Play plays from ${at} s, but the slider is at ${await scrubTime(page)} s`);
   // A tap on the lane jumps to the nearest mark.
   const lane = await page.locator('#own-lane').boundingBox(), mark = await page.locator('#own-lane .sign').first().boundingBox();
   await page.touchscreen.tap(mark.x + mark.width / 2, lane.y + lane.height / 2);

@@ -56,12 +56,12 @@ await withConsole(fulcrum, browser, 65, async ({address, newPage, trouble, out})
 
   await page.click('#stop');
   await page.click('#stop-yes');
-  await page.waitForSelector('#report:visible', {timeout: 30_000});
+  await page.waitForSelector('#report:visible');
   await page.waitForSelector('#result-figures dd');
   expect(await page.textContent('#power') === '30 W', 'the power chosen before stays chosen');
   await look(page, 'ended', folder);
   await page.click('#report');
-  await page.frameLocator('#report-frame').locator('h1, h2').first().waitFor({timeout: 20_000});
+  await page.frameLocator('#report-frame').locator('h1, h2').first().waitFor();
   await page.screenshot({path: join(folder, 'report-1920.png')});
   await page.click('#report-close');
 

@@ -4,6 +4,7 @@ import {readFileSync} from 'node:fs';
 import {createServer} from 'node:http';
 import {extname, join} from 'node:path';
 import {chromium} from 'playwright-core';
+import {until} from './console.mjs';
 
 const types = {'.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.svg': 'image/svg+xml'};
 
@@ -62,6 +63,11 @@ export class Imitation {
     response.end(readFileSync(join(folder, name)));
   }
 
+  /** Number of requests so far with this path and, if it is given, this body. */
+  count(path, body) {
+    return this.calls.filter(([to, text]) => to === path && (body === undefined || text === body)).length;
+  }
+
   feed(state) {
     if (state) this.state = state;
     if (this.silent) return;
@@ -73,14 +79,18 @@ export class Imitation {
   }
 }
 
-/** Opens the page with gamepads `pads` and a socket that grants the controls to each request, and keeps what is sent in `sent`. */
+/** Opens the page with gamepads `pads`, which counts how often the page reads them in `reads`, and with a socket that grants the controls to each request and keeps what is sent in `sent`. */
 export async function openPage(browserPath, address) {
   const browser = await chromium.launch({executablePath: browserPath, args: ['--no-sandbox', '--disable-dev-shm-usage', '--disable-gpu']});
   const page = await browser.newPage({viewport: {width: 1280, height: 800}});
   await page.addInitScript(() => {
     window.sent = [];
     window.pads = [];
-    navigator.getGamepads = () => window.pads;
+    window.reads = 0;
+    navigator.getGamepads = () => {
+      ++window.reads;
+      return window.pads;
+    };
     window.WebSocket = class {
       static OPEN = 1;
       readyState = 1;
@@ -97,6 +107,12 @@ export async function openPage(browserPath, address) {
   });
   await page.goto(address);
   return {browser, page};
+}
+
+/** Waits until the page has read the gamepads, and sent what its keys and buttons move, `count` times more. */
+export async function beats(page, count) {
+  const from = await page.evaluate(() => window.reads);
+  await until(page, 5, end => window.reads >= end, from + count + 1);
 }
 
 /** What the page has sent since the last call, but motions. */

@@ -1,6 +1,6 @@
 // The page beside an imitation of the console: page.mjs FULCRUM CHROMIUM FOLDER PAGE, where PAGE is the folder of its files.
 import {expect, until} from './console.mjs';
-import {Imitation, idle, keysOf, openPage, running, sleep} from './imitation.mjs';
+import {Imitation, beats, idle, keysOf, openPage, running, sleep} from './imitation.mjs';
 
 const [, browserPath, , files] = process.argv.slice(2);
 
@@ -32,8 +32,10 @@ const toastSays = text => !document.getElementById('toast').hidden && document.g
 await withPage('after a lost connection the session and the next notice are shown', running({notice: {number: 4, ok: true, text: 'fourth'}}), async ({page, console}) => {
   await until(page, 5, showsSession);
   console.state = running();
+  console.silent = true;  // Until the banner was seen, which the next connection hides.
   console.breakStreams();
   await until(page, 2, () => !document.getElementById('banner').hidden && document.body.dataset.phase === 'unknown');
+  console.silent = false;
   await until(page, 5, showsSession);
   // A console that was started again counts from 1.
   console.feed(running({notice: {number: 1, ok: false, text: 'restart failed'}}));
@@ -73,10 +75,11 @@ await withPage('quick presses of the generator\u2019s knobs all count', running(
   await sleep(2000);
   expect(await page.textContent('#set-cut') === '60 W', `the last press counts, but ${await page.textContent('#set-cut')}`);
   console.answers['/api/generator'] = () => ({ok: false, text: 'no'});
+  const before = console.count('/api/generator', 'cut=65');
   await page.click('#cut-more');
   await until(page, 2, toastSays, 'no');
   await sleep(600);
-  expect(console.calls.filter(([path, body]) => path === '/api/generator' && body === 'cut=65').length === 2, 'a refused press is not repeated');
+  expect(console.count('/api/generator', 'cut=65') === before + 1, 'a refused press is not repeated');
 });
 
 await withPage('a session that fails to start opens no older attempt', idle(), async ({page, console}) => {
@@ -88,20 +91,23 @@ await withPage('a session that fails to start opens no older attempt', idle(), a
   console.answers['/api/attempt/events'] = {ready: true, why: '', events: [], left_out: 0};
   const operate = async (state, ended) => {
     await page.click('[data-goto=training]');
+    await page.evaluate(() => { document.getElementById('toast').textContent = ''; });
     await page.click('[aria-label="Operate line"]');
-    await sleep(200);
+    // The page has the answer to its start.
+    await until(page, 3, () => document.getElementById('toast').textContent.startsWith('Take the controls'));
     console.feed(state);
     await until(page, 3, () => document.body.dataset.view === 'session');
     console.feed(ended);
     await until(page, 3, () => document.body.dataset.phase === 'idle');
-    await sleep(500);
   };
   await operate(idle({phase: 'starting', own: true}), idle({ended: {well: false, text: 'another session runs in domain 0'}}));
+  await sleep(500);
   expect(!(await page.isVisible('#attempt-box')), 'the attempt of another session stays closed');
   expect(await page.isVisible('#result-word') && await page.textContent('#result-word') === 'another session runs in domain 0', 'the reason is in view');
   console.answers['/api/training'] = training([attempt('20260101-000100-line'), attempt('20260101-000000-line')]);
   await operate(idle({phase: 'starting', own: true}), idle({session: '20260101-000100-line', ended: {well: true, text: 'All went well.'}}));
-  expect(await page.isVisible('#attempt-box') && console.calls.some(([path]) => path === '/api/attempt'), 'its own attempt opens');
+  await page.waitForSelector('#attempt-box', {state: 'visible'});
+  expect(console.count('/api/attempt') > 0, 'its own attempt opens');
 });
 
 /** The page with a live picture and a gamepad without a button pressed. */
@@ -112,7 +118,7 @@ async function withHands(what, use) {
       window.pads = down && [{connected: true, index: 0, id: 'pad', axes: [0, 0, 0, 0], buttons: Array.from({length: 17}, (_, i) => ({pressed: down.includes(i)}))}] || [null];
     }, buttons);
     await pad([]);
-    await sleep(100);
+    await beats(page, 2);
     await use({page, console, pad});
   });
 }
@@ -134,12 +140,12 @@ await withHands('a gamepad that is lost lets everything go', async ({page, pad})
 
 await withHands('a trigger that was down before does not press; Start takes and Back releases', async ({page, pad}) => {
   await pad([7]);
-  await sleep(100);
+  await beats(page, 2);
   await take(page);
-  await sleep(150);
+  await beats(page, 4);
   expect((await keysOf(page)).length === 0, 'a trigger held while the controls are taken is no pedal');
   await pad([]);
-  await sleep(60);
+  await beats(page, 2);
   await pad([7]);
   await until(page, 1, () => window.sent.includes('down=cut'));
   await pad([8]);
@@ -183,7 +189,7 @@ await withHands('keys work beside Shift and on keyboards that have digits with S
   await page.keyboard.up('Shift');
   expect((await keysOf(page)).join() === 'down=cut,down=fine,up=cut,up=fine', 'a key rises whatever it would write now');
   await page.evaluate(() => { window.sent = []; });
-  await sleep(100);
+  await beats(page, 3);
   expect(await page.evaluate(() => window.sent.length > 0 && window.sent.every(text => /x=-?0.00&y=-?0.00/.test(text))), 'the arrow has risen');
 });
 console.log('the page beside an imitation of the console');

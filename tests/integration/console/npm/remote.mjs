@@ -67,7 +67,7 @@ try {
     await page.keyboard.press('Escape');
     await page.click('#stop');
     await page.click('#stop-yes');
-    await page.waitForSelector('#report:visible', {timeout: 30_000});
+    await page.waitForSelector('#report:visible');
   });
 } catch (error) {
   console.log(`failed: ${error.stack}`);
