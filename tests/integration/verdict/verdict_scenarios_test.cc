@@ -6,7 +6,7 @@
 namespace fulcrum {
 namespace {
 
-constexpr int kDomain = 79;
+constexpr int kDomain = 94;
 
 TEST(VerdictScenarios, FakeNodesGetTheKnownVerdict) {
   for (const testing::Scenario& scenario : testing::VerdictScenarios()) {

@@ -22,7 +22,7 @@ using testing::Cart;
 using testing::Program;
 using testing::WaitFor;
 
-constexpr int kDomain = 75, kOtherDomain = 76;
+constexpr int kDomain = 75, kOtherDomain = 93;
 constexpr double kPatience_s = 30;
 
 class Crash : public ::testing::Test {

@@ -29,7 +29,7 @@ using testing::Eyes;
 using testing::WaitFor;
 using Seconds = std::chrono::duration<double>;
 
-constexpr int kDomain = 73, kBrowserDomain = 68;
+constexpr int kDomain = 69, kBrowserDomain = 68;
 constexpr double kPatience_s = 60;
 
 TEST(Hands, AreRefusedBeforeAnyNodeStarts) {

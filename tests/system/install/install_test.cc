@@ -225,10 +225,10 @@ TEST_F(InstallTest, SessionRunsFromTheInstalledPlaces) {
   const std::string fulcrum = root_ / "usr/bin/fulcrum";
   const std::string said =
       Output("/usr/bin/env", {"-C", "/proc", "XDG_CACHE_HOME=" + (folder_ / "cache").string(), fulcrum, "up", "small",
-                              "--domain", "83", "--seconds", "1", "--out", elsewhere});
+                              "--domain", "89", "--seconds", "1", "--out", elsewhere});
   EXPECT_TRUE(fs::exists(elsewhere / "latest/report.html")) << said;
   // Other findings depend on this machine.
-  Program program(fulcrum, {"doctor", "--domain", "83"});
+  Program program(fulcrum, {"doctor", "--domain", "89"});
   program.End(0);
   const std::string doctor = program.Said();
   EXPECT_NE(doctor.find("all in " + (root_ / "usr/libexec/fulcrum").string()), std::string::npos) << doctor;

@@ -14,7 +14,7 @@ fs::path Out() { return fs::path(::testing::TempDir()) / "soak_test"; }
 TEST(Soak, BlowsAreSurvivedAndTold) {
   fs::remove_all(Out());
   fulcrum::testing::Program soak(
-      "fulcrum", {"soak", "small", "--minutes", "0.6", "--chaos", "--seed", "2", "--domain", "58", "--out", Out()});
+      "fulcrum", {"soak", "small", "--minutes", "0.6", "--chaos", "--seed", "2", "--domain", "59", "--out", Out()});
   std::optional<int> code;
   ASSERT_TRUE(fulcrum::testing::WaitFor(150, [&] { return (code = soak.Poll()).has_value(); })) << soak.Said();
   const std::string said = soak.Said();
@@ -29,7 +29,7 @@ TEST(Soak, BlowsAreSurvivedAndTold) {
 }
 
 TEST(Soak, ALengthBeyondThatOfAScriptIsRefusedByItsName) {
-  fulcrum::testing::Program soak("fulcrum", {"soak", "small", "--minutes", "1441", "--domain", "58", "--out", Out()});
+  fulcrum::testing::Program soak("fulcrum", {"soak", "small", "--minutes", "1441", "--domain", "59", "--out", Out()});
   std::optional<int> code;
   ASSERT_TRUE(fulcrum::testing::WaitFor(20, [&] { return (code = soak.Poll()).has_value(); })) << soak.Said();
   EXPECT_EQ(*code, 2);
@@ -38,7 +38,7 @@ TEST(Soak, ALengthBeyondThatOfAScriptIsRefusedByItsName) {
 
 TEST(Soak, ANodeThatEndsByItselfIsACrash) {
   fs::remove_all(Out());
-  fulcrum::testing::Program soak("fulcrum", {"soak", "small", "--minutes", "0.2", "--domain", "58", "--out", Out()});
+  fulcrum::testing::Program soak("fulcrum", {"soak", "small", "--minutes", "0.2", "--domain", "59", "--out", Out()});
   pid_t thermal = 0;
   // thermal_node of the session that the soak has started.
   ASSERT_TRUE(fulcrum::testing::WaitFor(90, [&] {
