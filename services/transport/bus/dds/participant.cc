@@ -35,12 +35,17 @@ namespace fast = eprosima::fastdds::dds;
 namespace rtps = eprosima::fastrtps::rtps;
 using eprosima::fastrtps::Duration_t;
 
-/// A participant announces itself often while it is new and seldom afterwards: eight of them received a thousand
-/// announcements a second of each other.
-const Duration_t kAnnouncement{0, 200 * kMilli_ns}, kFirstAnnouncements{0, 20 * kMilli_ns};
-constexpr std::uint32_t kFirstAnnouncementCount = 25;
-/// With keys, each announcement of a participant that has not authenticated yet can start its handshake.
-const Duration_t kSecuredAnnouncement{0, 100 * kMilli_ns};
+/// A participant announces itself often while it is new and seldom afterwards: each announcement wakes two threads of
+/// every other participant.
+struct Announcing {
+  std::uint32_t first_count;
+  Duration_t first, later;
+};
+const Announcing kOpenAnnouncing{25, {0, 20 * kMilli_ns}, {0, 200 * kMilli_ns}};
+/// With keys, each announcement of a participant that has not authenticated yet can start its handshake. The gate holds
+/// the answers to the first one until the participant has been made; without a gate they can be lost, and a later
+/// announcement has to replace them.
+const Announcing kSecuredAnnouncing{50, {0, 100 * kMilli_ns}, {1, 0}};
 /// Delay after which a reader requests the samples for late joiners; the first heartbeat may have come before the
 /// match.
 const Duration_t kFirstAcknack{0, 10 * kMilli_ns};
@@ -72,8 +77,9 @@ fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint
   if (gathering) qos.transport().user_transports.back() = dds::LetGather(udp, gathering);
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   discovery.leaseDuration = Duration_t(settings.lease_s, 0);
-  discovery.leaseDuration_announcementperiod = settings.security.on() ? kSecuredAnnouncement : kAnnouncement;
-  if (!settings.security.on()) discovery.initial_announcements = {kFirstAnnouncementCount, kFirstAnnouncements};
+  const Announcing& announcing = settings.security.on() ? kSecuredAnnouncing : kOpenAnnouncing;
+  discovery.initial_announcements = {announcing.first_count, announcing.first};
+  discovery.leaseDuration_announcementperiod = announcing.later;
   if (settings.security.on()) *gate = dds::ApplySecurity(settings.security, &qos);
   if (settings.security.encrypt) dds::BoundPacking(kMostPacked_B, &qos);
   return qos;
