@@ -137,7 +137,7 @@ std::string AddVideo(const SessionSetup& setup, const SessionRecord& record, con
   const std::filesystem::path scene = setup.folder.path / "scene.fulcrum";
   video = MakeVideo({.replayer = setup.settings.programs / "replayer",
                      .recording = setup.recording,
-                     .scene = setup.settings.scene,
+                     .scene = scene,
                      .video = setup.folder.path / "video.mp4",
                      .log = setup.folder.logs / "video.log"},
                     goes_on);
