@@ -200,7 +200,7 @@ void Recorder::Write() {
   const std::lock_guard lock(mutex_);
   file_B_ = file_->bytes_written();
   if (file_->error().empty()) return;
-  ended_ = file_->error() + ": the recording has ended; free space, or record elsewhere (--record)";
+  ended_ = file_->error() + ": the recording has ended; free space, or record elsewhere (--record-to)";
   for (const recording::PackedChunk::Part& part : packed_.parts) {
     counts_[static_cast<std::size_t>(channels_[part.channel].topic)].unwritten += part.messages;
   }

@@ -55,7 +55,7 @@ std::string Room::Reason() const {
     return "the file has nearly reached the limit of this process on the size of a file (ulimit -f); raise it";
   }
   return Megabytes(free_B_) + " are free on its disk, " + Megabytes(keep_free_B_) +
-         " stay free (recorder.keep_free_MB of the cart file); delete old sessions, or record elsewhere (--record)";
+         " stay free (recorder.keep_free_MB of the cart file); delete old sessions, or record elsewhere (--record-to)";
 }
 
 }  // namespace fulcrum::recorder
