@@ -16,7 +16,7 @@ std::array<Vec3d, kMaxTools> RollReferences(const SceneView& scene) {
 }
 
 HandsView MakeHandsView(const SceneView& scene, const RenderParams& camera, int height, const ToolState& tools,
-                        const std::array<Vec3d, kMaxTools>& roll_references) {
+                        const HandleState& handles, const std::array<Vec3d, kMaxTools>& roll_references) {
   const Eigen::Matrix4f view = MakeLaparoscope(camera).view;
   constexpr float kRadPerDeg = 0.0174532925f;
   HandsView hands;
@@ -32,6 +32,8 @@ HandsView MakeHandsView(const SceneView& scene, const RenderParams& camera, int 
     if (tools.tools[i].kind != ToolKind::kNone) {
       hands.roll_rad[i] = ToolRoll(tools.tools[i].kind, tools.tools[i].q_WT, roll_references[i]);
     }
+    const HandleSample& handle = handles.handles[i];
+    hands.closed[i] = handle.present && IsClosed(handle.jaw_angle_rad, hands.scope[i]);
     hands.force_N[i] = tools.tools[i].f_W.norm();
   }
   return hands;

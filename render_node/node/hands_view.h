@@ -13,7 +13,8 @@ namespace fulcrum::render {
 /// a 3-D display shows it: a motion of the pointer means the same in either part.
 /// @param height of the picture [pixels]. @param roll_references of the scene's tools (below).
 [[nodiscard]] HandsView MakeHandsView(const SceneView& scene, const RenderParams& camera, int height,
-                                      const ToolState& tools, const std::array<Vec3d, kMaxTools>& roll_references);
+                                      const ToolState& tools, const HandleState& handles,
+                                      const std::array<Vec3d, kMaxTools>& roll_references);
 
 /// RollReference of each tool of a scene.
 [[nodiscard]] std::array<Vec3d, kMaxTools> RollReferences(const SceneView& scene);

@@ -186,14 +186,21 @@ void RenderNode::TakeClips() {
 }
 
 // Samples that wait too long unread would count as lost. Of the streams the newest is read after the pause, but each
-// patch shows another place, and a tube whose handle is let go must stop.
+// patch shows another place, an event tells of an injury or a vessel that bleeds from then on, and a tube whose handle
+// is let go must stop.
 void RenderNode::PassOver() {
-  (void)ports_.tools.TakeLatest(&new_tools_);
+  // On the page the controls are taken by the header of the newest picture.
+  const std::array<ToolSample, kMaxTools> before = new_tools_.tools;
+  if (ports_.tools.TakeLatest(&new_tools_)) {
+    const auto is_there = [](const ToolSample& a, const ToolSample& b) { return a.p_WT == b.p_WT; };
+    changed_on_screen_ = changed_on_screen_ || (streams_ && !std::ranges::equal(before, new_tools_.tools, is_there));
+  }
   if (!hud_.tube) (void)ports_.handles.TakeLatest(&new_handles_);
   while (hud_.tube && ports_.handles.TakeNext(&new_handles_)) FollowValves();
   (void)ports_.contacts.TakeLatest(&contact_);
   (void)ports_.contact_models.TakeLatest(&contact_model_);
   while (ports_.patches.TakeNext(&patch_)) held_patches_[PlaceOf(patch_.header)] = patch_;
+  while (ports_.events.TakeNext(&event_)) held_events_.push_back(event_);
 }
 
 void RenderNode::TakeThermal() {
@@ -220,30 +227,34 @@ void RenderNode::Apply(const TemperaturePatch& patch) {
 }
 
 void RenderNode::TakeEvents() {
-  while (ports_.events.TakeNext(&event_)) {
-    switch (event_.kind) {
-      case ThermalEventKind::kCut:
-        view_.OpenVessels(event_.material, event_.session_time_s);
-        [[fallthrough]];
-      case ThermalEventKind::kSteam:
-      case ThermalEventKind::kChar:
-        view_.AddSmoke(event_.material, event_.session_time_s);
-        break;
-      case ThermalEventKind::kUreterWarning:
-      case ThermalEventKind::kUreterInjury:
-        warned_s_[0] = event_.session_time_s;
-        injured_[0] = injured_[0] || event_.kind == ThermalEventKind::kUreterInjury;
-        break;
-      case ThermalEventKind::kNerveWarning:
-      case ThermalEventKind::kNerveInjury:
-        warned_s_[1] = event_.session_time_s;
-        injured_[1] = injured_[1] || event_.kind == ThermalEventKind::kNerveInjury;
-        break;
-      default:
-        break;
-    }
-    changed_on_screen_ = changed_in_file_ = true;
+  for (const ThermalEvent& event : held_events_) Apply(event);
+  held_events_.clear();
+  while (ports_.events.TakeNext(&event_)) Apply(event_);
+}
+
+void RenderNode::Apply(const ThermalEvent& event) {
+  switch (event.kind) {
+    case ThermalEventKind::kCut:
+      view_.OpenVessels(event.material, event.session_time_s);
+      [[fallthrough]];
+    case ThermalEventKind::kSteam:
+    case ThermalEventKind::kChar:
+      view_.AddSmoke(event.material, event.session_time_s);
+      break;
+    case ThermalEventKind::kUreterWarning:
+    case ThermalEventKind::kUreterInjury:
+      warned_s_[0] = event.session_time_s;
+      injured_[0] = injured_[0] || event.kind == ThermalEventKind::kUreterInjury;
+      break;
+    case ThermalEventKind::kNerveWarning:
+    case ThermalEventKind::kNerveInjury:
+      warned_s_[1] = event.session_time_s;
+      injured_[1] = injured_[1] || event.kind == ThermalEventKind::kNerveInjury;
+      break;
+    default:
+      break;
   }
+  changed_on_screen_ = changed_in_file_ = true;
 }
 
 bool RenderNode::Recent(double time_s) const { return session_time_s_ - time_s < kTextLife_s; }
@@ -342,7 +353,8 @@ void RenderNode::TakeSize() {
 }
 
 HandsView RenderNode::ViewNow() const {
-  return MakeHandsView(scene_, camera_.params(), shape_.height, tools_, roll_references_);
+  // Not of what a paused picture shows: who takes the controls begins where the tools are.
+  return MakeHandsView(scene_, camera_.params(), shape_.height, new_tools_, new_handles_, roll_references_);
 }
 
 PictureHeader RenderNode::HeaderNow() {

@@ -12,6 +12,7 @@
 #include <optional>
 #include <string>
 #include <tuple>
+#include <vector>
 
 #include "render_node/geometry/camera_control.h"
 #include "render_node/geometry/quality.h"
@@ -115,6 +116,7 @@ class RenderNode {
   /// Instead of what follows while the picture is paused.
   void PassOver();
   void Apply(const TemperaturePatch& patch);
+  void Apply(const ThermalEvent& event);
   void TakeClips();
   void TakeThermal();
   void TakeTools();
@@ -134,7 +136,7 @@ class RenderNode {
   void UpdateHands();
   /// The window gives up the controls when another source has claimed them.
   void YieldHands();
-  /// Where the pixels of the picture lie, and the tools.
+  /// Where the pixels of the picture lie, and the tools are now.
   [[nodiscard]] HandsView ViewNow() const;
   [[nodiscard]] PictureHeader HeaderNow();
   void FindLate();
@@ -179,6 +181,7 @@ class RenderNode {
   ClipState clips_;
   TemperaturePatch patch_;
   std::map<PatchPlace, TemperaturePatch> held_patches_;  // During a pause.
+  std::vector<ThermalEvent> held_events_;                // The same.
   ToolState tools_, new_tools_;
   HandleState handles_, new_handles_;
   std::array<TrumpetValve, kMaxTools> valves_;

@@ -23,11 +23,16 @@ constexpr float kSteady_s = 0.06f;
 
 }  // namespace
 
+bool IsClosed(float jaw_rad, bool scope) {
+  return scope ? jaw_rad > 0.5f * kZoomRing_rad : jaw_rad < 0.5f * kOpenJaw_rad;
+}
+
 void MouseHands::SetView(const HandsView& view) {
   for (std::size_t i = 0; i < view.present.size(); ++i) {
     if (!view.present[i] || view_.present[i]) continue;
     wanted_[i] = sent_[i] = view.tip[i];
     roll_[i] = view.roll_rad[i];
+    locked_[i] = view.closed[i];
   }
   view_ = view;
   const auto first = std::find(view_.present.begin(), view_.present.end(), true);
@@ -40,7 +45,7 @@ void MouseHands::Take(std::int64_t now_ns) {
   claim_ns_ = sent_ns_ = now_ns;
   wanted_ = sent_ = view_.tip;
   roll_ = view_.roll_rad;
-  locked_ = {};
+  locked_ = view_.closed;
 }
 
 void MouseHands::Release() {
@@ -80,8 +85,9 @@ void MouseHands::Roll(float by_rad) {
 
 void MouseHands::Choose(int tool) {
   if (tool == tool_ || !view_.present[static_cast<std::size_t>(tool)]) return;
-  // The tool that is left keeps what it holds.
+  // The tool that is left keeps what it holds, and the jaw of the new one waits for the next press.
   if (jaw_down_) locked_[static_cast<std::size_t>(tool_)] = true;
+  jaw_down_ = false;
   tool_ = tool;
 }
 

@@ -20,6 +20,7 @@ struct HandsView {
   std::array<bool, kMaxTools> scope{};                ///< It is a scope: its motion moves the picture.
   std::array<Vec3f, kMaxTools> tip = AtOrigin();      ///< Newest places of the tips [m].
   std::array<float, kMaxTools> roll_rad{};            ///< Newest rolls about the shafts [rad].
+  std::array<bool, kMaxTools> closed{};               ///< The jaw is closed; of a scope: zoomed.
   std::array<float, kMaxTools> force_N{};             ///< Forces at the tips [N].
 };
 
@@ -40,6 +41,9 @@ enum class HandsKey {
   kRollRight
 };
 
+/// An angle at which HandsView::closed is true: below the half of a jaw's way, or above that of a scope's zoom ring.
+[[nodiscard]] bool IsClosed(float jaw_rad, bool scope);
+
 class MouseHands {
  public:
   explicit MouseHands(OperatorSource source) : source_(source) {}
@@ -47,7 +51,7 @@ class MouseHands {
   /// A tool that was not there before begins where it is.
   void SetView(const HandsView& view);
 
-  /// Takes the controls: the tools begin where they are, turned as they are.
+  /// Takes the controls: the tools begin where they are, turned as they are, and closed jaws are locked.
   void Take(std::int64_t now_ns);
   /// Releases them: pedals up, tools let go.
   void Release();

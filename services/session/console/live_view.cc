@@ -36,7 +36,7 @@ void PressNamed(const Form& form, std::string_view field, bool down, MouseHands*
   }
 }
 
-HandsView ViewOf(const PictureHeader& header, const std::array<float, kMaxTools>& roll_rad) {
+HandsView ViewOf(const PictureHeader& header, const std::array<OperatorTool, kMaxTools>& operated) {
   HandsView view;
   view.eye = header.eye_W;
   view.right = header.right_W;
@@ -44,10 +44,12 @@ HandsView ViewOf(const PictureHeader& header, const std::array<float, kMaxTools>
   view.forward = header.forward_W;
   view.pixel = header.pixel_rad;
   view.tip = header.tip_W;
-  view.roll_rad = roll_rad;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     view.present[i] = (header.present >> i & 1u) != 0;
     view.scope[i] = (header.scopes >> i & 1u) != 0;
+    if (!operated[i].moves) continue;
+    view.roll_rad[i] = operated[i].roll_rad;
+    view.closed[i] = IsClosed(operated[i].jaw_angle_rad, view.scope[i]);
   }
   return view;
 }
@@ -78,7 +80,7 @@ void LiveView::SetSession(MakePorts make, std::uint64_t session) {
   if (session != 0 && session != session_) {
     // Nothing of the last session's operator remains.
     hands_ = MouseHands(OperatorSource::kBrowser);
-    roll_rad_ = {};
+    operated_ = {};
     session_ = session;
   }
   choice_ = {};
@@ -118,7 +120,7 @@ void LiveView::Receive(Socket* viewer, std::string_view text, std::int64_t now_n
   }
   if (form->contains("take") && ports_.hands && picture_.header.stamp.sequence != 0) {
     hands_.Release();  // Keys that another page holds end with its controls.
-    hands_.SetView(ViewOf(picture_.header, roll_rad_));
+    hands_.SetView(ViewOf(picture_.header, operated_));
     hands_.Take(now_ns);
     holder_ = viewer;
   }
@@ -129,7 +131,7 @@ void LiveView::Receive(Socket* viewer, std::string_view text, std::int64_t now_n
 }
 
 void LiveView::Apply(const Form& form, std::int64_t now_ns) {
-  hands_.SetView(ViewOf(picture_.header, roll_rad_));
+  hands_.SetView(ViewOf(picture_.header, operated_));
   PressNamed(form, "down", true, &hands_);
   const double x = NumberOf(form, "x", -kLongestMove, kLongestMove).value_or(0);
   const double y = NumberOf(form, "y", -kLongestMove, kLongestMove).value_or(0);
@@ -142,9 +144,9 @@ void LiveView::Apply(const Form& form, std::int64_t now_ns) {
   Write(now_ns);
 }
 
-void LiveView::NoteRolls(const OperatorInput& input) {
+void LiveView::NoteTools(const OperatorInput& input) {
   for (std::size_t i = 0; i < kMaxTools; ++i) {
-    if (input.tools[i].moves) roll_rad_[i] = input.tools[i].roll_rad;
+    if (input.tools[i].moves) operated_[i] = input.tools[i];
   }
 }
 
@@ -153,7 +155,7 @@ void LiveView::Write(std::int64_t now_ns) {
   input_ = hands_.At(now_ns);
   input_.stamp = stamper_->Next(now_ns);
   epoch_ = input_.stamp.epoch;
-  NoteRolls(input_);
+  NoteTools(input_);
   (void)ports_.hands->Write(input_);
 }
 
@@ -180,7 +182,7 @@ void LiveView::Turn(std::int64_t now_ns) {
 void LiveView::ReadOthers(std::int64_t now_ns) {
   OperatorInput received;
   while (ports_.others->TakeNext(&received)) {
-    if (choice_.Add(received)) NoteRolls(received);
+    if (choice_.Add(received)) NoteTools(received);
   }
   const OperatorInput* const now = choice_.At(now_ns);
   const bool own = now == nullptr || (now->source == OperatorSource::kBrowser && now->stamp.epoch == epoch_);

@@ -38,7 +38,7 @@ class LiveView {
   using MakePorts = std::function<Ports()>;
 
   /// A session has begun, or ended (empty, 0). @param session its number: in one that is joined again the tools are
-  /// still turned as its operators have turned them.
+  /// still turned, and their jaws closed, as its operators have left them.
   void SetSession(MakePorts make, std::uint64_t session);
 
   void Open(Socket* viewer);
@@ -57,7 +57,7 @@ class LiveView {
   };
 
   void Apply(const Form& form, std::int64_t now_ns);
-  void NoteRolls(const OperatorInput& input);
+  void NoteTools(const OperatorInput& input);
   void Write(std::int64_t now_ns);
   void ReadOthers(std::int64_t now_ns);
   void SendPicture(Socket* socket, Viewer* viewer);
@@ -74,7 +74,7 @@ class LiveView {
   Socket* holder_ = nullptr;  ///< The viewer with the controls.
   OperatorSource other_ = OperatorSource::kNone;
   MouseHands hands_{OperatorSource::kBrowser};
-  std::array<float, kMaxTools> roll_rad_{};  ///< To which an operator has turned each tool last.
+  std::array<OperatorTool, kMaxTools> operated_{};  ///< What an operator has done with each tool last.
   std::unique_ptr<bus::Stamper> stamper_;
   std::uint64_t epoch_ = 0;
   OperatorChoice choice_;

@@ -35,6 +35,7 @@ struct NodeBus {
   std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patches_out = patches.MakeOutput();
   std::unique_ptr<bus::Output<ToolState>> tools_out = tools.MakeOutput();
   std::unique_ptr<bus::Output<HandleState>> handles_out = handles.MakeOutput();
+  std::unique_ptr<bus::Output<ThermalEvent>> events_out = events.MakeOutput();
   std::unique_ptr<bus::Output<ContactModel>> contact_models_out = contact_models.MakeOutput();
   std::unique_ptr<bus::Output<ClipState>> clips_out = clips.MakeOutput();
   std::unique_ptr<bus::LoanOutput<Picture>> pictures_out = pictures.MakeOutput();

@@ -205,6 +205,36 @@ TEST_F(LiveViewTest, ToolsKeepTheirRollWhoeverTakesThem) {
   EXPECT_EQ(Newest().tools[1].roll_rad, -0.25f) << "as the window has left it";
 }
 
+TEST_F(LiveViewTest, JawsStayClosedWhoeverTakesTheTools) {
+  Page page;
+  live_.Open(&page);
+  Turn();
+  Draw();
+  Say(&page, "take=1");
+  EXPECT_GT(Newest().tools[1].jaw_angle_rad, 0.5f);
+  Say(&page, "down=lock");
+  Say(&page, "up=lock&release=1");
+  (void)Newest();
+  Say(&page, "take=1");
+  EXPECT_EQ(Newest().tools[1].jaw_angle_rad, 0) << "what it holds does not fall";
+  EXPECT_TRUE(page.Shows("\"locked\":true"));
+  const auto window = hands_.MakeOutput();
+  OperatorInput input;
+  input.stamp = {1, 77, now_ + kMs};
+  input.claim_ns = now_ + kMs;
+  input.source = OperatorSource::kWindow;
+  input.tools[0] = {Vec3f::Zero(), 0, 0, true};
+  input.tools[1] = {Vec3f::Zero(), 0.7f, 0, true};
+  ASSERT_TRUE(window->Write(input));
+  now_ += kMs;
+  Turn();
+  (void)Newest();
+  Say(&page, "take=1");
+  const OperatorInput taken = Newest();
+  EXPECT_EQ(taken.tools[0].jaw_angle_rad, 0) << "the window has closed it";
+  EXPECT_GT(taken.tools[1].jaw_angle_rad, 0.5f) << "the window has opened it";
+}
+
 TEST_F(LiveViewTest, TheNextSessionBeginsWithoutWhatTheLastOperatorChose) {
   Page page;
   live_.Open(&page);

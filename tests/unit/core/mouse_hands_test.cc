@@ -80,6 +80,7 @@ TEST_F(MouseHandsTest, JawsPedalsAndTools) {
   EXPECT_EQ(hands_.At(6 * kMs).tools[0].jaw_angle_rad, 0);
   EXPECT_GT(hands_.At(6 * kMs).tools[1].jaw_angle_rad, 0.5f);
   hands_.Press(HandsKey::kTool1, true);
+  EXPECT_GT(hands_.At(7 * kMs).tools[1].jaw_angle_rad, 0.5f) << "the button is down for the tool before";
   hands_.Press(HandsKey::kJaw, false);
   EXPECT_EQ(hands_.At(7 * kMs).tools[0].jaw_angle_rad, 0) << "what it holds is kept";
   hands_.Press(HandsKey::kCut, true);
@@ -136,6 +137,38 @@ TEST_F(MouseHandsTest, WhoTakesThemFindsTheToolsTurnedAsTheyAre) {
   view.roll_rad = {};
   hands_.SetView(view);
   EXPECT_EQ(hands_.At(8 * kMs).tools[1].roll_rad, 0.5f);
+}
+
+TEST_F(MouseHandsTest, WhoTakesThemFindsTheJawsAsTheyAre) {
+  HandsView view = View();
+  view.present[2] = view.scope[2] = true;
+  view.tip[2] = view.eye;
+  hands_.SetView(view);
+  hands_.Take(5 * kMs);
+  hands_.Press(HandsKey::kTool0, true);
+  hands_.Press(HandsKey::kJawLock, true);
+  hands_.Press(HandsKey::kTool2, true);
+  hands_.Press(HandsKey::kJawLock, true);
+  hands_.Release();
+  // As the picture shows them, whoever has closed them.
+  view.closed = {true, false, true};
+  hands_.SetView(view);
+  hands_.Take(6 * kMs);
+  OperatorInput input = hands_.At(7 * kMs);
+  EXPECT_EQ(input.tools[0].jaw_angle_rad, 0) << "what it holds does not fall";
+  EXPECT_GT(input.tools[1].jaw_angle_rad, 0.5f);
+  EXPECT_NEAR(input.tools[2].jaw_angle_rad, 1.0472f, 1e-4f) << "still zoomed";
+  hands_.Press(HandsKey::kTool0, true);
+  EXPECT_TRUE(hands_.locked(0));
+  hands_.Press(HandsKey::kJawLock, true);
+  EXPECT_GT(hands_.At(8 * kMs).tools[0].jaw_angle_rad, 0.5f);
+  // Another source has opened it meanwhile.
+  view.closed = {};
+  hands_.Release();
+  hands_.SetView(view);
+  hands_.Take(9 * kMs);
+  EXPECT_GT(hands_.At(10 * kMs).tools[0].jaw_angle_rad, 0.5f);
+  EXPECT_EQ(hands_.At(10 * kMs).tools[2].jaw_angle_rad, 0) << "wide";
 }
 
 TEST_F(MouseHandsTest, AScopeTurnsWithThePointerRollsAndZooms) {
