@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "handle_bridge/serial/serial_port.h"
+#include "services/base/config/operation.h"
 #include "services/base/core/operator_script.h"
 
 namespace fulcrum::handle_bridge {
@@ -93,8 +94,9 @@ LinkFaults FaultsAt(const config::SimulatedUnit& unit, double session_time_s) {
 }
 
 ScriptedHands::ScriptedHands(const SceneView& scene, const config::CartConfig& cart) : scene_(scene), cart_(cart) {
+  const bool by_person = config::MovedByPerson(cart, scene.tools);
   for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
-    const bool stays = scene.tools[tool].assists() && cart.handles[tool].kind == config::LinkKind::kOperator;
+    const bool stays = scene.tools[tool].assists() && by_person;
     // Once: a script that a hand performs has 180,000 keys of a tool in an hour, and the firmware asks at 400 Hz.
     stays_s_[tool] = stays ? LastHoldOf(scene.script, tool) : std::numeric_limits<double>::infinity();
   }

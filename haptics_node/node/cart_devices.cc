@@ -8,6 +8,7 @@
 #include "haptics_node/device/simulated_device.h"
 #include "haptics_node/device/touch_device.h"
 #include "haptics_node/node/trocar_store.h"
+#include "services/base/config/operation.h"
 #include "services/base/core/operator_script.h"
 
 namespace fulcrum::haptics {
@@ -104,20 +105,21 @@ CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& sce
   const std::shared_ptr<TouchDriver> driver = MakeTouchDriver(cart, used, touch_library);
   CartDevices made;
   made.touch = driver;
+  const bool by_person = config::MovedByPerson(cart, scene.tools);
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
     const DeviceConfig& device = cart.devices[i];
     if (!used[i]) continue;
     const Trocar trocar{scene.tools[i].p_WP.cast<double>(), scene.tools[i].shaft_length_m};
-    // No person operates an assistant.
-    const bool assists = scene.tools[i].assists() && device.kind == DeviceKind::kOperator;
-    switch (assists ? DeviceKind::kSimulated : device.kind) {
+    // No operator's input moves an assistant.
+    const bool assists = scene.tools[i].assists();
+    switch (assists && device.kind == DeviceKind::kOperator ? DeviceKind::kSimulated : device.kind) {
       case DeviceKind::kNone:
         break;
       case DeviceKind::kSimulated: {
         const WorkspaceMap map =
             device.motion.empty() ? WorkspaceMap() : MapOf(cart, i, trocar.p_WP, "", trocars, &made.notes);
         auto simulated = MakeSimulated(device, scene, i, map);
-        if (assists) simulated->set_script_end(LastHoldOf(scene.script, i));
+        if (assists && by_person && device.motion.empty()) simulated->set_script_end(LastHoldOf(scene.script, i));
         made.devices[i] = std::move(simulated);
         break;
       }

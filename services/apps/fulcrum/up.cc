@@ -1,6 +1,7 @@
 #include <cstdio>
 
 #include "services/apps/fulcrum/commands.h"
+#include "services/base/config/operation.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/install_places.h"
 #include "services/base/runtime/realtime.h"
@@ -55,14 +56,16 @@ fs::path AttachTo(const po::variables_map& values) {
 
 ExitCode Up(const Words& words) {
   po::options_description options;
-  options.add_options()                                                                                              //
-      ("seconds", po::value<double>()->value_name("N"),                                                              //
-       "session time [s], above 0, at most 604800 (default: the script's duration; without a script until Ctrl-C)")  //
-      ("out", po::value<std::string>()->value_name("DIR")->default_value("out"), "folder for the session folders")   //
-      ("window", "also show the picture in a window")                                                                //
+  options.add_options()                                  //
+      ("seconds", po::value<double>()->value_name("N"),  //
+       "session time [s], above 0, at most 604800 (default: the script's duration; without a script, and where Touch "
+       "devices move the tools, until Ctrl-C)")                                                                     //
+      ("out", po::value<std::string>()->value_name("DIR")->default_value("out"), "folder for the session folders")  //
+      ("window", "also show the picture in a window")                                                               //
       ("hands", po::value<std::string>()->value_name("INPUT"),
        "operate the tools yourself, with INPUT: mouse (and keyboard or gamepad, in the window), browser (the page of "
-       "fulcrum console). No script; until Ctrl-C or --seconds")                                            //
+       "fulcrum console): no script, until Ctrl-C or --seconds; or script: the scene's script moves all, whatever "
+       "devices the cart has")                                                                              //
       ("quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),                      //
        "quality of the picture: auto, low, high")                                                           //
       ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")  //
@@ -125,12 +128,16 @@ ExitCode Up(const Words& words) {
   bool on_page = false;
   if (values.count("hands") != 0) {
     const std::string input = values["hands"].as<std::string>();
-    if (input != "mouse" && input != "browser") {
-      throw InputError("--hands: \"" + input + "\"; valid: mouse, browser");
+    if (input != "mouse" && input != "browser" && input != "script") {
+      throw InputError("--hands: \"" + input + "\"; valid: mouse, browser, script");
     }
-    GiveToOperator(&settings);
+    if (input == "script") {
+      config::LetScriptMove(&settings.cart);
+    } else {
+      GiveToOperator(&settings);
+    }
     on_page = input == "browser";
-    settings.window = settings.window || !on_page;
+    settings.window = settings.window || input == "mouse";
   }
   settings.quality = values["quality"].as<std::string>();
   if (settings.quality != "auto" && settings.quality != "low" && settings.quality != "high") {

@@ -12,6 +12,7 @@
 #include <optional>
 #include <utility>
 
+#include "services/base/config/operation.h"
 #include "services/base/core/tick.h"
 #include "services/base/runtime/cyclic_thread.h"
 #include "services/base/runtime/realtime.h"
@@ -88,7 +89,8 @@ struct Console::Impl {
              .cart = given.cart,
              .data = given.data,
              .database = given.database,
-             .domain = given.domain}),
+             .domain = given.domain,
+             .touch = !given.cart.empty() && config::HasTouch(config::LoadCart(given.cart))}),
         watch(given.domain),
         training(given.database, given.courses, given.out),
         films(

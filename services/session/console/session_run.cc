@@ -9,6 +9,7 @@
 #include "services/base/core/error.h"
 #include "services/base/runtime/private_file.h"
 #include "services/session/console/screen_text.h"
+#include "services/session/console/training_group.h"
 #include "services/session/supervisor/node_process.h"
 #include "services/session/supervisor/outcome.h"
 
@@ -50,7 +51,11 @@ std::vector<std::string> UpWords(const SessionRunSettings& settings, const Sessi
   if (order.picture_rate_Hz) add("--set", "render.png_rate_Hz=" + supervisor::Fixed(*order.picture_rate_Hz, 1));
   // The page shows the recording itself, and a trainee waits for the score.
   if (order.record) words.insert(words.end(), {"--record", "--no-video"});
-  if (order.hands) add("--hands", "browser");
+  if (order.trainee == kExpert) {
+    add("--hands", "script");
+  } else if (order.hands && (order.trainee.empty() || !settings.touch)) {
+    add("--hands", "browser");
+  }
   if (!order.trainee.empty()) {
     add("--trainee", order.trainee);
     add("--database", settings.database.string());

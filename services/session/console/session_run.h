@@ -16,7 +16,7 @@ struct SessionOrder {
   std::string scene;
   std::optional<double> power_W, seconds, picture_rate_Hz;
   bool record = true;
-  bool hands = false;   ///< The tools follow the operator on the page; no script.
+  bool hands = false;   ///< The tools follow the operator on the page, or a trainee's Touch devices; no script.
   std::string trainee;  ///< The score is stored under this name; empty: not stored.
 };
 
@@ -27,6 +27,7 @@ struct SessionRunSettings {
   std::filesystem::path data;      ///< Folder of meshes; empty: the folder of the scene.
   std::filesystem::path database;  ///< Of the trainees.
   int domain = config::DefaultDomain();
+  bool touch = false;  ///< The cart has a Touch: trainees operate with it, not on the page.
 };
 
 /// How a session ended.

@@ -2,6 +2,7 @@
 
 #include <ctime>
 
+#include "services/base/config/operation.h"
 #include "services/base/core/error.h"
 #include "services/nodes/app/cart_security.h"
 #include "services/records/recording/free_name.h"
@@ -38,10 +39,6 @@ std::vector<NodeId> RemoteNodesOf(const SceneView& scene, const UpSettings& sett
     if ((scene.node_mask & settings.remote) >> i & 1u) nodes.push_back(static_cast<NodeId>(i));
   }
   return nodes;
-}
-
-double EndOfSession(const UpSettings& settings, const SceneView& scene) {
-  return settings.seconds >= 0 ? settings.seconds : static_cast<double>(scene.script_duration_s);
 }
 
 std::string RunYaml(const UpSettings& settings, double end_s) {
@@ -87,6 +84,11 @@ std::filesystem::path RecordingFile(const UpSettings& settings, const SessionFol
 }
 
 }  // namespace
+
+double EndOfSession(const UpSettings& settings, const SceneView& scene) {
+  if (settings.seconds >= 0) return settings.seconds;
+  return config::MovedByPerson(settings.cart, scene.tools) ? 0 : static_cast<double>(scene.script_duration_s);
+}
 
 SessionMemory::~SessionMemory() { bus::RemoveSharedMemory(path); }
 

@@ -29,6 +29,9 @@ struct SessionMemory {
   SessionMemory& operator=(const SessionMemory&) = delete;
 };
 
+/// Session time of the end [s]; 0: until stopped, because a person moves the tools or the settings say so.
+[[nodiscard]] double EndOfSession(const UpSettings& settings, const SceneView& scene);
+
 struct SessionSetup {
   /// Checks the keys, takes the domain, opens shared memory and the trainees' database, makes the session folder.
   /// Throws InputError or MismatchError.

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "services/base/config/operation.h"
 #include "services/base/core/error.h"
 
 namespace fulcrum::config {
@@ -51,6 +52,22 @@ TEST(Cart, TouchFileNamesTwoDevices) {
   EXPECT_EQ(cart.devices[0].kind, DeviceKind::kTouch);
   EXPECT_EQ(cart.devices[1].kind, DeviceKind::kTouch);
   EXPECT_NE(cart.devices[0].serial, cart.devices[1].serial);
+}
+
+TEST(Cart, AScriptMovesSimulatedDevicesWhateverTheCartHas) {
+  CartConfig cart = LoadCart(FULCRUM_SOURCE_DIR "/deploy/carts/touch.yaml");
+  std::array<ToolDescription, kMaxTools> tools;
+  EXPECT_TRUE(HasTouch(cart));
+  EXPECT_FALSE(MovedByPerson(cart, tools)) << "the scene has no tools";
+  tools[1].kind = ToolKind::kHook;
+  EXPECT_TRUE(MovedByPerson(cart, tools));
+  const int domain = cart.domain;
+  LetScriptMove(&cart);
+  EXPECT_FALSE(HasTouch(cart));
+  EXPECT_FALSE(MovedByPerson(cart, tools));
+  EXPECT_EQ(cart.handles[0].kind, LinkKind::kSimulated);
+  EXPECT_EQ(cart.pedal.kind, LinkKind::kSimulated);
+  EXPECT_EQ(cart.domain, domain);
 }
 
 TEST(Cart, AssignsAxesAndButtonsOfAGamepadByName) {

@@ -19,6 +19,7 @@
 #include "services/session/console/router.h"
 #include "services/session/console/screen_text.h"
 #include "services/session/console/session_run.h"
+#include "services/session/console/training_group.h"
 
 namespace fulcrum::console {
 namespace {
@@ -373,6 +374,24 @@ TEST(SessionRun, WordsOfAnOrder) {
   const std::vector<std::string> words = UpWords(settings, order);
   const std::vector<std::string> scored{"--trainee", "Ann", "--database", "/d.sqlite"};
   EXPECT_TRUE(std::equal(scored.begin(), scored.end(), words.end() - 4));
+}
+
+TEST(SessionRun, TraineesOperateWithTheTouchOfTheCartAndDemonstrationsAreTheScripts) {
+  SessionRunSettings settings;
+  const auto hands = [&](const std::string& trainee, bool on) {
+    SessionOrder order{.scene = "/s.yaml", .power_W = {}, .seconds = {}, .picture_rate_Hz = {}, .trainee = trainee};
+    order.hands = on;
+    const std::vector<std::string> words = UpWords(settings, order);
+    const auto option = std::ranges::find(words, "--hands");
+    return option == words.end() ? std::string() : *(option + 1);
+  };
+  EXPECT_EQ(hands("Ann", true), "browser");
+  EXPECT_EQ(hands(kExpert, false), "script");
+  EXPECT_EQ(hands("", false), "");
+  settings.touch = true;
+  EXPECT_EQ(hands("Ann", true), "");
+  EXPECT_EQ(hands(kExpert, false), "script");
+  EXPECT_EQ(hands("", true), "browser") << "a session that is to be operated on the page";
 }
 
 TEST(SessionRun, ItsEndIsNotThatOfASessionStartedElsewhere) {

@@ -83,5 +83,21 @@ TEST(ScriptedHands, AnAssistantBesideAPersonHoldsOn) {
   EXPECT_NEAR(ScriptedHands(scene, cart).At(9).jaw_deg[0], 0.1 * kDegPerRad, 1e-3);
 }
 
+TEST(FollowScript, AnAssistantDoesNotLetGoByTheClockBesideAPerson) {
+  const std::array keys = {ScriptKey{1, 2, Vec3f::Zero(), 0.8f, 0, 0}, ScriptKey{2, 2, Vec3f::Zero(), 0.0f, 0, 0},
+                           ScriptKey{10, 2, Vec3f::Zero(), 0.0f, 0, 0}, ScriptKey{11, 2, Vec3f::Zero(), 0.8f, 0, 0}};
+  SceneView scene;
+  scene.script = keys;
+  scene.tools[0].kind = ToolKind::kHook;
+  scene.tools[2].kind = ToolKind::kGrasper;
+  scene.tools[2].traction_N = 2;
+  config::CartConfig cart;
+  EXPECT_NEAR(FollowScript(scene, cart, 12).jaw_deg[2], 0.8 * kDegPerRad, 1e-3) << "the whole script";
+  for (const config::DeviceKind kind : {config::DeviceKind::kTouch, config::DeviceKind::kOperator}) {
+    cart.devices[0].kind = kind;
+    EXPECT_NEAR(FollowScript(scene, cart, 12).jaw_deg[2], 0, 1e-3);
+  }
+}
+
 }  // namespace
 }  // namespace fulcrum::handle_bridge

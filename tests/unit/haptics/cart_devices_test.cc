@@ -158,6 +158,27 @@ TEST_F(CartDevicesTest, HandsDifferByTheirStiffness) {
   EXPECT_NEAR(yield(config::HandHold::kScene), 1 / HandModel(scene.haptics).stiffness_N_m, 1e-7);
 }
 
+TEST_F(CartDevicesTest, AnAssistantStaysBesideATouch) {
+  TouchRig rig;
+  const std::array keys = {ScriptKey{0, 2, Vec3f(0, 0, 0), 0.8f, 0, 0}, ScriptKey{1, 2, Vec3f(0, 0, 0), 0.0f, 0, 0},
+                           ScriptKey{2, 2, Vec3f(0.03f, 0, 0), 0.8f, 0, 0}};
+  scene.script = keys;
+  scene.tools[2] = scene.tools[0];
+  scene.tools[2].traction_N = 2;
+  const auto way = [&] {
+    const CartDevices made = Make();
+    Vec3d first, last;
+    for (std::uint64_t i = 1000; i < 3000; ++i) {
+      last = made.devices[2]->ReadPosition(TickAt(i));
+      if (i == 1000) first = last;
+    }
+    return (last - first).norm();
+  };
+  EXPECT_GT(way(), 0.005) << "the script leaves";
+  UseTouch("Left Device");
+  EXPECT_LT(way(), 0.001);
+}
+
 TEST_F(CartDevicesTest, RecordedMotionIsFollowedThroughTheWorkspaceMap) {
   const auto poses = Swing(kPivot, 0.2, 0);
   UseMotion(poses);

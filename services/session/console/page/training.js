@@ -66,7 +66,7 @@ const training = (() => {
     const byHand = trainee === 'me';
     // The replay of the attempt draws its recording.
     const fields = {scene: exercise.scene, record: 'on', hands: byHand ? 'on' : 'off', trainee};
-    if (await order('/api/start', fields, byHand ? 'Take the controls when the picture comes, and press Stop when you have finished.' : 'The script shows how it is done.')) ran = byHand;
+    if (await order('/api/start', fields, byHand ? 'Take the controls when the picture comes (on a cart with Touch devices: these), and press Stop when you have finished.' : 'The script shows how it is done.')) ran = byHand;
   }
 
   function showAttempt(attempt) {
