@@ -58,21 +58,30 @@ void CoupledNodes::ReplaceTools(std::vector<ToolState>* inputs) const {
   *inputs = std::move(replaced);
 }
 
+template <class T>
+void CoupledNodes::Deliver(const Tick& tick, bool starts, Way<T>* way, std::vector<T>* inputs) {
+  inputs->clear();
+  bool news = starts;
+  while (!way->sent.empty() && way->sent.front().stamp.stamp_ns + kDelay_ns <= tick.stamp_ns) {
+    way->consumed = std::move(way->sent.front());
+    way->sent.pop_front();
+    news = true;
+  }
+  if (news && way->consumed) inputs->push_back(*way->consumed);
+}
+
 Outcome CoupledNodes::Step(const RecordedTick& recorded) {
   RecordedTick tick = recorded;
   ReplaceTools(&tick.tools);
   Replace(NodeId::kPhysics, &tick.model, models_);
   Replace(NodeId::kPhysics, &tick.cautery, cautery_);
-  const auto take_newest = [&tick]<class T>(std::deque<T>* sent, std::vector<T>* inputs) {
-    inputs->clear();
-    while (!sent->empty() && sent->front().stamp.stamp_ns + kDelay_ns <= tick.tick.stamp_ns) {
-      *inputs = {std::move(sent->front())};
-      sent->pop_front();
-    }
-  };
-  if (tick.node == NodeId::kPhysics && Has(NodeId::kThermal)) take_newest(&topology_, &tick.topology);
-  if (tick.node == NodeId::kPhysics && Has(NodeId::kThermal)) take_newest(&open_cells_, &tick.open_cells);
-  if (tick.node == NodeId::kThermal && Has(NodeId::kPhysics)) take_newest(&tears_, &tick.tears);
+  const auto [epoch, first] = epochs_.try_emplace(tick.node, tick.epoch);
+  const bool starts = first || std::exchange(epoch->second, tick.epoch) != tick.epoch;
+  if (tick.node == NodeId::kPhysics && Has(NodeId::kThermal)) {
+    Deliver(tick.tick, starts, &topology_, &tick.topology);
+    Deliver(tick.tick, starts, &open_cells_, &tick.open_cells);
+  }
+  if (tick.node == NodeId::kThermal && Has(NodeId::kPhysics)) Deliver(tick.tick, starts, &tears_, &tick.tears);
   ReplayedNode& node = *nodes_.at(tick.node);
   Outcome outcome;
   outcome.state_hash = node.Step(tick);
@@ -91,9 +100,9 @@ Outcome CoupledNodes::Step(const RecordedTick& recorded) {
   if (tick.node == NodeId::kHaptics && !tools_.empty()) outcome.tools = tools_.rbegin()->second;
   Keep(outcome.model, &models_);
   Keep(outcome.cautery, &cautery_);
-  if (outcome.topology && Has(NodeId::kPhysics)) topology_.push_back(*outcome.topology);
-  if (outcome.open_cells && Has(NodeId::kPhysics)) open_cells_.push_back(*outcome.open_cells);
-  if (outcome.tear && Has(NodeId::kThermal)) tears_.push_back(*outcome.tear);
+  if (outcome.topology && Has(NodeId::kPhysics)) topology_.sent.push_back(*outcome.topology);
+  if (outcome.open_cells && Has(NodeId::kPhysics)) open_cells_.sent.push_back(*outcome.open_cells);
+  if (outcome.tear && Has(NodeId::kThermal)) tears_.sent.push_back(*outcome.tear);
   return outcome;
 }
 

@@ -40,6 +40,16 @@ class CoupledNodes {
   void Replace(NodeId owner, std::vector<T>* inputs, const std::map<std::int64_t, T>& sent) const;
   /// A tool stays where it is until the next sample.
   void ReplaceTools(std::vector<ToolState>* inputs) const;
+  /// Sent samples on their way to one reader, of which only the newest counts.
+  template <class T>
+  struct Way {
+    std::deque<T> sent;         ///< Not consumed by any tick yet.
+    std::optional<T> consumed;  ///< The newest that a tick has consumed.
+  };
+  /// Replaces the inputs by what has arrived until the tick. A reader that has just started gets the newest sample
+  /// again, like any late joiner.
+  template <class T>
+  static void Deliver(const Tick& tick, bool starts, Way<T>* way, std::vector<T>* inputs);
   [[nodiscard]] bool Has(NodeId node) const { return nodes_.count(node) != 0; }
 
   std::map<NodeId, std::unique_ptr<ReplayedNode>> nodes_;
@@ -47,10 +57,10 @@ class CoupledNodes {
   std::map<std::int64_t, ToolState> tools_;
   std::map<std::int64_t, ContactModel> models_;
   std::map<std::int64_t, CauteryContact> cautery_;
-  // Sent samples that no tick has consumed yet.
-  std::deque<TopologyState> topology_;
-  std::deque<OpenCells> open_cells_;
-  std::deque<TearState> tears_;
+  Way<TopologyState> topology_;
+  Way<OpenCells> open_cells_;
+  Way<TearState> tears_;
+  std::map<NodeId, std::uint64_t> epochs_;  ///< Of each node's last tick.
 };
 
 }  // namespace fulcrum::replay

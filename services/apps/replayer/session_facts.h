@@ -20,11 +20,12 @@
 
 namespace fulcrum::replay {
 
-/// Nominal period by node [s], in whole nanoseconds, as the cyclic thread counts.
+/// Nominal period by node [s], in whole nanoseconds, as the cyclic thread counts; 0 for a node without a rate.
 [[nodiscard]] inline std::array<double, kNodeCount> NodePeriods(const config::CartConfig& cart) {
   std::array<double, kNodeCount> period_s{};
-  for (const NodeId node : {NodeId::kHandleBridge, NodeId::kHaptics, NodeId::kPhysics, NodeId::kThermal}) {
-    period_s[static_cast<std::size_t>(node)] = 1e-9 * std::round(1e9 / cart.timing(node).rate_Hz);
+  for (std::size_t node = 0; node < period_s.size(); ++node) {
+    const double rate_Hz = cart.timing(static_cast<NodeId>(node)).rate_Hz;
+    if (rate_Hz > 0) period_s[node] = 1e-9 * std::round(1e9 / rate_Hz);
   }
   return period_s;
 }

@@ -339,8 +339,11 @@ std::uint32_t ReadNodes(StrictMap* root, std::uint32_t all) {
       ++node;
     }
     if (node == kSceneNodes) {
-      root->Fail("nodes",
-                 "no node '" + name + "'; valid: handle_bridge, haptics_node, physics_node, thermal_node, render_node");
+      std::string valid;
+      for (int known = 1; known < kSceneNodes; ++known) {
+        valid += (known == 1 ? "" : ", ") + std::string(NodeName(static_cast<NodeId>(known)));
+      }
+      root->Fail("nodes", "no node '" + name + "'; valid: " + valid);
     }
     mask |= 1u << static_cast<unsigned>(node);
   }

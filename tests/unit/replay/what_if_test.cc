@@ -5,9 +5,13 @@
 
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <sstream>
 
 #include "services/apps/replayer/changed_scene.h"
+#include "services/apps/replayer/coupled_nodes.h"
+#include "services/apps/replayer/session_facts.h"
+#include "services/apps/replayer/tick_source.h"
 #include "services/apps/replayer/what_if_report.h"
 #include "services/base/core/error.h"
 #include "services/base/core/solids.h"
@@ -59,6 +63,37 @@ TEST_F(WhatIfTest, NothingChangedIsNoDifference) {
   EXPECT_EQ(result.max_position_mm, 0);
   EXPECT_GT(result.cut_length_mm.before, 1);
   EXPECT_EQ(result.cut_length_mm.before, result.cut_length_mm.after);
+}
+
+// Thermal publishes in milliseconds 3 of ten and physics reads in 0, in the recording as in a coupled replay, so the
+// states are the recorded ones.
+TEST_F(WhatIfTest, AProcessOfPhysicsThatStartsAfterTheCutHasTheCut) {
+  const std::filesystem::path folder = folder_ / "killed";
+  std::filesystem::create_directories(folder);
+  EXPECT_GT(testing::RecordCart(scene_->view(), folder, {.seconds = 3.2, .kill_physics_s = 2.9}), 1e-3f);
+  const std::vector<NodeId> both{NodeId::kPhysics, NodeId::kThermal};
+  TickSource source(folder / "recording.mcap", both, NodePeriods({}));
+  const config::CartConfig cart;
+  CoupledNodes nodes(both, {scene_->view(), cart, folder / "again", 1});
+  RecordedTick tick;
+  std::map<std::uint64_t, int> different;  // By the epoch of physics.
+  while (source.Next(&tick)) {
+    ASSERT_EQ(tick.missing, "");
+    const Outcome outcome = nodes.Step(tick);
+    if (tick.node == NodeId::kPhysics) different[tick.epoch] += outcome.state_hash == tick.state_hash ? 0 : 1;
+  }
+  ASSERT_EQ(different.size(), 2u);
+  EXPECT_EQ(different.begin()->second, 0);
+  EXPECT_EQ(different.rbegin()->second, 0) << "the sheet of the new process is whole";
+}
+
+TEST_F(WhatIfTest, EachNodeWithARateHasAPeriod) {
+  const config::CartConfig cart;
+  const auto period_s = NodePeriods(cart);
+  for (std::size_t node = 0; node < period_s.size(); ++node) {
+    EXPECT_EQ(period_s[node] > 0, cart.timing(static_cast<NodeId>(node)).rate_Hz > 0) << node;
+  }
+  EXPECT_DOUBLE_EQ(period_s[static_cast<std::size_t>(NodeId::kRender)], 0.033333333);
 }
 
 TEST_F(WhatIfTest, AWeakGripLetsGo) {
