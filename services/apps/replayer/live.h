@@ -16,7 +16,7 @@ struct LiveSettings {
   std::filesystem::path recording;
   int domain = config::DefaultDomain();
   bus::Security security = {};  ///< Off: the settings of the session that runs in the domain are used.
-  double from_s = 0;            ///< Start, as time after the first message of the recording [s].
+  double from_s = 0;            ///< Start, as time after the first message of the recording, 0 or more [s].
   std::vector<NodeId> nodes;    ///< Nodes whose messages are published.
 };
 
@@ -25,9 +25,10 @@ struct LiveResult {
   double latest_s = 0;  ///< Largest delay of a message [s].
 };
 
-/// Publishes the messages of those nodes, each when it is due, until the end of the recording or `stop`. Times and
-/// epochs in the messages are shifted to the present, so that readers accept them as live. Commands and their replies
-/// are not sent. Throws InputError.
+/// Publishes the messages of those nodes, each when it is due, until the end of the recording or `stop`. Times in the
+/// messages are shifted to the present, and epochs become times of this replay, so that readers accept them as live. Of
+/// what is before `from_s`, only what a late joiner receives is sent. Commands and their replies are not sent. Throws
+/// InputError, also where the recording ends before `from_s`.
 LiveResult ReplayLive(const LiveSettings& settings, const std::function<bool()>& stop);
 
 }  // namespace fulcrum::replay
