@@ -105,11 +105,16 @@ void RefuseForeignOptions(const CommandLine& line) {
   }
 }
 
+constexpr int kLongestRecording_s = 7 * 24 * 3600;  // As of fulcrum up.
+
 LiveSettings LiveSettingsFrom(const CommandLine& line) {
   LiveSettings settings;
   settings.recording = RecordingsOf(line).front();
   settings.domain = line.ValueOf<int>("domain");
   settings.from_s = line.ValueOf<double>("from");
+  if (!(settings.from_s >= 0 && settings.from_s <= kLongestRecording_s)) {
+    throw InputError("--from: must be 0 (the first message) to " + std::to_string(kLongestRecording_s) + " seconds");
+  }
   if (line.Has("only") && line.Has("except")) throw InputError("give --only or --except, not both");
   settings.nodes = line.Has("only") ? NodesNamed(line, "only", kPublishers) : kPublishers;
   for (const NodeId node : NodesNamed(line, "except", kPublishers)) std::erase(settings.nodes, node);
@@ -149,6 +154,17 @@ void ReadPace(const CommandLine& line, LockStepSettings* settings) {
   settings->until_s = line.ValueOf<double>("until");
 }
 
+/// Throws InputError for an option without effect on the pictures of render. @param alone no other node is replayed.
+void RefuseBesidePictures(const CommandLine& line, bool alone) {
+  for (const char* option : {"set", "console", "json", "rate", "threads"}) {
+    const std::string name = option;
+    const bool of_all = name == "set" || name == "console";
+    if (!line.IsGiven(option) || !(of_all || alone)) continue;
+    throw InputError("--" + name + " cannot be combined with node render, whose pictures are those of the recording" +
+                     (of_all ? "" : "; name another node as well"));
+  }
+}
+
 /// Reads --set and --console and refuses options that exclude them.
 void ReadVariant(const CommandLine& line, Options* options) {
   options->changes = line.TextsOf("set");
@@ -156,6 +172,7 @@ void ReadVariant(const CommandLine& line, Options* options) {
     throw InputError("--rate cannot be combined with --set: both replays run as fast as possible");
   }
   options->console = line.Has("console");
+  if (options->pictures) RefuseBesidePictures(line, options->lock_step.nodes.empty());
   if (options->console && !(options->changes.empty() && line.TextOf("json").empty())) {
     throw InputError("--console cannot be combined with --set or --json");
   }
@@ -219,10 +236,20 @@ void ReadFiles(const CommandLine& line, Options* options) {
   options->json = line.TextOf("json");
 }
 
-}  // namespace
+/// Writes the reason for which a test cannot begin into its JUnit file: a file of an earlier test would stay otherwise.
+void ReportFailedTest(const CommandLine& line, const std::string& why) {
+  const std::string& file = line.TextOf("junit");
+  if (!line.Has("test") || file.empty()) return;
+  NodeId node = NodeId::kPhysics;
+  try {
+    if (const auto nodes = NodesNamed(line, "test", kReplayable); !nodes.empty()) node = nodes[0];
+  } catch (const InputError&) {  // `why` names it.
+  }
+  const std::vector<std::string> recordings = line.TextsOf("recording");
+  WriteJUnit(FailedTest(node, recordings.empty() ? "" : recordings[0], why), file);
+}
 
-Options ParseOptions(int argc, char** argv) {
-  const CommandLine line(argc, argv);
+Options OptionsFrom(const CommandLine& line) {
   Options options;
   if (line.Has("help")) {
     options.answer = line.Help();
@@ -262,6 +289,18 @@ Options ParseOptions(int argc, char** argv) {
   ReadVariant(line, &options);
   ReadFiles(line, &options);
   return options;
+}
+
+}  // namespace
+
+Options ParseOptions(int argc, char** argv) {
+  const CommandLine line(argc, argv);
+  try {
+    return OptionsFrom(line);
+  } catch (const std::exception& error) {
+    ReportFailedTest(line, error.what());
+    throw;
+  }
 }
 
 config::CartConfig LoadCart(const Options& options) {

@@ -38,7 +38,8 @@ struct Options {
   bool quiet = false;                 ///< Print no progress.
 };
 
-/// Checks the command line. Throws InputError that names the option and the valid values.
+/// Checks the command line. Throws InputError that names the option and the valid values; a test's JUnit file contains
+/// it then.
 [[nodiscard]] Options ParseOptions(int argc, char** argv);
 
 /// Loads the cart of a replay other than live. Throws InputError.

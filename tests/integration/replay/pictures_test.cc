@@ -404,6 +404,28 @@ TEST(IntoRender, ASampleThatNoNodeTakesChangesNoPicture) {
   EXPECT_TRUE(Drawn(spoilt, "frames") == pictures);
 }
 
+TEST(IntoRender, RefusesWhatWouldNotChangeThePictures) {
+  const testing::ShortSession session("pictures_refused", {.seconds = 0.2}, FourPicturesASecond);
+  using Words = std::vector<std::string>;
+  const std::string json = session.folder() / "r.json";
+  for (const auto& [more, option] :
+       {std::pair<Words, std::string>{{"render", "--set", "physics.grip_force_N=4"}, "set"},
+        {{"physics", "render", "--set", "physics.grip_force_N=4"}, "set"},
+        {{"render", "--console"}, "console"},
+        {{"physics", "render", "--console"}, "console"},
+        {{"render", "--json", json}, "json"},
+        {{"render", "--rate", "1"}, "rate"},
+        {{"render", "--threads", "2"}, "threads"}}) {
+    Words words{session.recording(), "--into"};
+    words.insert(words.end(), more.begin(), more.end());
+    fulcrum::testing::Program replayer("replayer", words);
+    EXPECT_EQ(replayer.End(0), 2) << option;
+    EXPECT_NE(replayer.Said().find("--" + option + " cannot be combined with node render"), std::string::npos)
+        << replayer.Said();
+  }
+  EXPECT_FALSE(std::filesystem::exists(session.folder() / "replayed_frames"));
+}
+
 TEST(IntoRender, DrawsTheSamePicturesToTheLastByteOrFails) {
   const testing::ShortSession session("pictures_test", {.seconds = 1.6}, FourPicturesASecond);
   const auto first = Drawn(session, "first"), second = Drawn(session, "second");

@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/integration/replay/short_session.h"
@@ -115,6 +117,28 @@ TEST_F(TestNodeTest, ALogOfAnotherSceneIsAMismatchAndStandsInTheFile) {
   EXPECT_EQ(answer.code, 3) << answer.said;
   EXPECT_NE(answer.said.find("was recorded with another scene"), std::string::npos) << answer.said;
   EXPECT_NE(fulcrum::testing::ReadFile(JUnit()).find("errors=\"1\""), std::string::npos);
+}
+
+// A CI system that reads the file must not find the result of an earlier test in it.
+TEST_F(TestNodeTest, WhatPreventsATestStandsInItsFile) {
+  const fs::path lonely = session_->folder() / "lonely" / "recording.mcap";
+  fs::create_directories(lonely.parent_path());
+  fs::copy_file(session_->recording(), lonely);
+  const std::string log = session_->recording();
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases{
+      {{"thermal", "--inputs", "/nonexistent.mcap"}, "/nonexistent.mcap: no such file"},
+      {{"thermal", "--inputs", lonely}, "no scene.fulcrum beside"},
+      {{"thermal", "--inputs", log, "--assert", "cut_length_mm"}, "a comparison is missing"},
+      {{"kitchen", "--inputs", log}, "no such node here"}};
+  for (auto [words, expected] : cases) {
+    std::ofstream(JUnit()) << "<testsuites tests=\"1\" failures=\"0\" errors=\"0\"/>";
+    words.insert(words.end(), {"--junit", JUnit()});
+    const Answer answer = Run(words);
+    EXPECT_EQ(answer.code, 2) << answer.said;
+    const std::string file = fulcrum::testing::ReadFile(JUnit());
+    EXPECT_NE(file.find("errors=\"1\""), std::string::npos) << expected << file;
+    EXPECT_NE(file.find(expected), std::string::npos) << file;
+  }
 }
 
 }  // namespace
