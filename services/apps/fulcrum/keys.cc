@@ -6,6 +6,8 @@
 #include "services/apps/fulcrum/commands.h"
 #include "services/base/core/error.h"
 #include "services/transport/bus/dds/shared_memory.h"
+#include "services/transport/bus/hex.h"
+#include "services/transport/bus/schema.h"
 #include "services/transport/bus/topics.h"
 #include "services/transport/keys/authority.h"
 #include "services/transport/keys/issuing.h"
@@ -126,6 +128,12 @@ bus::Security KeysOf(const Arguments& arguments) {
   return session;
 }
 
+/// Where the tool finds the number of the session.
+fs::path SessionFileFor(const fs::path& out, const Arguments& arguments) {
+  const bool handed_over = !out.empty() && arguments.values.count("keys") == 0;
+  return (handed_over ? fs::absolute(out) : bus::SharedMemoryDirectory(DomainOf(arguments))) / "session";
+}
+
 ExitCode Issue(const Arguments& arguments, const std::string& name, int days) {
   const auto topics = [&](const char* option) {
     const auto given = arguments.values.find(option);
@@ -149,6 +157,10 @@ ExitCode Issue(const Arguments& arguments, const std::string& name, int days) {
       "It joins with DdsSettings.security {.keys = \"%s\", .identity = \"%s\"}%s\n",
       name.c_str(), Labels(order.writes).c_str(), Labels(order.reads).c_str(), keys::DateOf(validity.until).c_str(),
       folder.c_str(), name.c_str(), cart.encrypt ? " and .encrypt = true" : "");
+  std::printf(
+      "Without the library: the type of fulcrum/TOPIC is fulcrum/TOPIC#%s, the number of the session is the\n"
+      "first line of %s (idl/README.md, \"A program of your own\").\n",
+      bus::Hex(bus::SchemaHash()).c_str(), SessionFileFor(order.out, arguments).c_str());
   if (!order.out.empty()) std::printf("Hand that folder over by a private way: whoever has it is %s.\n", name.c_str());
   return ExitCode::kDone;
 }
