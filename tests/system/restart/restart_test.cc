@@ -28,7 +28,7 @@ using testing::WaitFor;
 
 constexpr double kStartLimit_s = 60.0;  // compiling the scene and five starts, on a busy machine
 constexpr double kEndLimit_s = 60.0;    // the script's 6 s, closing and the report, on a busy machine
-constexpr double kRejoinLimit_s = 20;   // of a killed node, on a busy machine; a free one: deploy/bench restart.
+constexpr double kRejoinLimit_s = 60;   // of a killed node, on a busy machine; a free one: deploy/bench restart.
 constexpr const char* kNodes[] = {"handle_bridge", "haptics_node", "physics_node", "thermal_node", "render_node"};
 
 /// Number under a key in the flat summary.json.
@@ -98,9 +98,11 @@ TEST(Cart, EachKilledNodeIsRestartedRejoinsAndTheRunEndsWell) {
   ASSERT_EQ(cart.FaultAtEnd(kEndLimit_s), "");
   const std::string summary = ReadFile(cart.session() / "summary.json");
   for (const std::string victim : kNodes) {
-    // The software rasteriser of a busy machine may have hung, too.
-    const double hung = Count(cart.Said(), "\n! " + victim + " was stuck in a step for too long");
-    EXPECT_EQ(Figure(summary, victim + ".restarts"), 1.0 + (victim == "render_node" ? hung : 0)) << victim << summary;
+    // The software rasteriser of a busy machine may have hung, too, also when it was killed.
+    const int hung =
+        victim == "render_node" ? Count(cart.Said(), "\n! render_node was stuck in a step for too long") : 0;
+    EXPECT_GE(Figure(summary, victim + ".restarts"), 1) << victim << summary;
+    EXPECT_LE(Figure(summary, victim + ".restarts"), 1 + hung) << victim << summary;
     EXPECT_GT(Figure(summary, victim + ".longest_rejoin_s").value_or(0), 0.0) << victim << summary;
     EXPECT_LE(Figure(summary, victim + ".longest_rejoin_s").value_or(1e9), kRejoinLimit_s) << victim << summary;
   }

@@ -90,7 +90,7 @@ try {
     }
     for (const t of [1, 3]) {
       await jump(t);
-      await until(page, 20, shows, t);
+      await until(page, 60, shows, t);
     }
     expect(await page.evaluate(() => document.getElementById('film-own-note').textContent) === '', 'no trouble with the recording');
     await shot('attempt');
