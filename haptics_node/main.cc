@@ -23,7 +23,7 @@ ExitCode RunHaptics(app::NodeApp& app) {
   haptics::CartDevices cart = haptics::MakeCartDevices(app.cart(), app.scene(), haptics::TrocarFolder());
   for (const std::string& note : cart.notes) Log(runtime::LogLevel::kInfo, note);
   if (cart.touch) cart.touch->Start();
-  const auto bell = std::make_shared<haptics::Bell>();  // The ports outlive the node.
+  const auto bell = std::make_shared<runtime::Bell>();  // The ports outlive the node.
   const auto ring = [bell] { bell->Ring(); };
   haptics::HapticsNode node(app.scene(), std::move(cart.devices),
                             {app.MakeInput<ContactModel>(ring), app.MakeInput<OperatorInput>(ring),
@@ -37,6 +37,8 @@ ExitCode RunHaptics(app::NodeApp& app) {
   below.spin_ns = 0;
   below.cpu = -1;
   servo.rests = node.resting();
+  servo.rests_until = [&node] { return node.ServoRestsUntil(); };
+  servo.bell = node.servo_bell();
   runtime::CyclicThread bus(below, [&](const Tick&) { node.BusTurn(); });
   bus.Start();
   return app.Run(

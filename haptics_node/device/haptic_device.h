@@ -32,6 +32,9 @@ class HapticDevice {
   [[nodiscard]] virtual std::uint8_t ReadButtons() const noexcept { return 0; }
   /// Sets the force on the hand at the attach point, in frame W [N]; it is held until the next call.
   virtual void WriteForce(const Vec3d& f_W) noexcept = 0;
+  /// Time until which the device stays where it is [CLOCK_MONOTONIC, ns], if the force on it stays 0; 0: unknown. As
+  /// ReadRoll.
+  [[nodiscard]] virtual std::int64_t RestsUntil() const noexcept { return 0; }
   /// State for Health. Call from any thread except the servo's.
   [[nodiscard]] virtual DeviceHealth Describe() const { return {}; }
 };

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "services/base/core/script_rest.h"
+
 namespace fulcrum::haptics {
 namespace {
 
@@ -65,6 +67,16 @@ Vec3d SimulatedDevice::ReadPosition(const Tick& tick) noexcept {
   session_time_s_ = tick.session_time_s;
   stamp_ns_ = tick.stamp_ns;
   return hand_.position();
+}
+
+std::int64_t SimulatedDevice::RestsUntil() const noexcept {
+  // The servo sees the hand at rest once more before it moves.
+  constexpr double kBefore_s = 2e-3;
+  if (motion_ || !placed_) return 0;
+  double until_s = ScriptRestsUntil(script_, tool_, std::min(session_time_s_, script_end_s_));
+  if (until_s >= script_end_s_) until_s = std::numeric_limits<double>::infinity();
+  const double rest_s = std::clamp(until_s - session_time_s_ - kBefore_s, 0.0, 1.0);
+  return stamp_ns_ + static_cast<std::int64_t>(1e9 * rest_s);
 }
 
 Vec3d RestOf(const SceneView& scene, std::uint32_t tool) {

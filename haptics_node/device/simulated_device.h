@@ -41,6 +41,7 @@ class SimulatedDevice final : public HapticDevice {
   [[nodiscard]] Vec3d ReadPosition(const Tick& tick) noexcept override;
   [[nodiscard]] float ReadRoll() const noexcept override { return point_.roll_rad; }
   void WriteForce(const Vec3d& f_W) noexcept override { sent_ = f_W; }
+  [[nodiscard]] std::int64_t RestsUntil() const noexcept override;
 
  private:
   /// Intended attach point at this session time.

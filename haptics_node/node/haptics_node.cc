@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "haptics_node/device/simulated_device.h"
+#include "services/base/runtime/cyclic_thread.h"
 #include "services/base/runtime/quantiles.h"
 #include "services/transport/bus/gate.h"
 
@@ -34,6 +35,10 @@ std::array<OperatedDevice*, kMaxTools> OperatedAmong(const DeviceArray& devices)
   return operated;
 }
 
+bool HasContacts(const ContactModel& model) {
+  return std::ranges::any_of(model.devices, [](const DeviceContacts& device) { return device.count > 0; });
+}
+
 void AddTrouble(Health* health, const std::string& trouble) {
   if (health->state == HealthState::kRunning) health->state = HealthState::kDegraded;
   if (!health->last_error.empty()) health->last_error += "; ";
@@ -41,9 +46,6 @@ void AddTrouble(Health* health, const std::string& trouble) {
 }
 
 }  // namespace
-
-/// Period of the servo.
-constexpr std::int64_t kTick_ns = 1'000'000;
 
 static_assert(kTicksPerManifest <= bus::kMaxTickTimes, "a manifest must have room for the times of its ticks");
 
@@ -86,13 +88,25 @@ void HapticsNode::ServoStep(const Tick& tick) noexcept {
   contacts_used_ = figures.contacts_used;
   figures_.Store(figures);
   if (!from_servo_.TryPush(tick_)) records_lost_.fetch_add(1, std::memory_order_relaxed);
-  if (rests_.load(std::memory_order_relaxed) && !AreAtRest(last_tools_, tick_.servo.tool)) ports_.bell->Ring();
+  stays_ = AreAtRest(last_tools_, tick_.servo.tool);
+  if (rests_.load(std::memory_order_relaxed) && !stays_) ports_.bell->Ring();
   last_tools_ = tick_.servo.tool;
 }
 
+std::int64_t HapticsNode::ServoRestsUntil() const noexcept {
+  const std::int64_t now_ns = last_tools_.stamp.stamp_ns;
+  if (!rests_.load(std::memory_order_relaxed) || !stays_ || servo_.creeping()) return now_ns;
+  std::int64_t until_ns = now_ns + ToolThinner::kLongRest_ns;
+  for (const auto& device : devices_) {
+    if (device) until_ns = std::min(until_ns, device->RestsUntil());
+  }
+  return until_ns;
+}
+
 void HapticsNode::BusStep() {
-  if (ports_.contact_model.TakeLatest(&received_) && !to_servo_.TryPush(received_)) {
-    models_not_taken_.fetch_add(1, std::memory_order_relaxed);
+  if (ports_.contact_model.TakeLatest(&received_)) {
+    if (!to_servo_.TryPush(received_)) models_not_taken_.fetch_add(1, std::memory_order_relaxed);
+    if (HasContacts(received_)) servo_bell_.Ring();
   }
   while (ports_.operator_input.TakeNext(&received_input_)) {
     if (operator_.Add(received_input_) && !inputs_to_servo_.TryPush(received_input_)) {
@@ -104,7 +118,7 @@ void HapticsNode::BusStep() {
 }
 
 void HapticsNode::BusTurn() {
-  constexpr int kMostRests = 20;  // Then the thread looks whether it is to end.
+  constexpr int kMostRests = 5;  // Then the thread looks whether it is to end.
   BusStep();
   for (int i = 0; i < kMostRests && rests(); ++i) {
     Rest();
@@ -114,21 +128,23 @@ void HapticsNode::BusTurn() {
 
 bool HapticsNode::IsAtRest() const {
   constexpr std::size_t kSettled_ticks = 100;
-  return thinner_.still_ticks() >= kSettled_ticks &&
-         std::all_of(received_.devices.begin(), received_.devices.end(),
-                     [](const DeviceContacts& device) { return device.count == 0; });
+  return thinner_.still_ticks() >= kSettled_ticks && !HasContacts(received_);
 }
 
 void HapticsNode::Rest() {
   // A record is pushed within this time of the begin of its tick, or is taken the next time.
   constexpr std::int64_t kServoStep_ns = 500'000;
-  const auto ticks = static_cast<std::int64_t>(thinner_.ticks_to_next());
-  ports_.bell->WaitUntil(record_.servo.tool.stamp.stamp_ns + ticks * kTick_ns + kServoStep_ns);
+  const std::int64_t due_ns = thinner_.published_ns() + ToolThinner::kLongRest_ns + kServoStep_ns;
+  // A tick that came early has published nothing: the servo rests for as long as that again.
+  const bool passed = due_ns <= runtime::MonotonicNs();
+  ports_.bell->WaitUntil(passed ? record_.servo.tool.stamp.stamp_ns + ToolThinner::kLongRest_ns + kServoStep_ns
+                                : due_ns);
 }
 
 void HapticsNode::Publish(const TickRecord& tick) {
   const ServoRecord& record = tick.servo;
-  const ToolThinner::Due& due = thinner_.Add(record.tool, record.session_time_s);
+  const ToolThinner::Due& due =
+      thinner_.Add(record.tool, record.session_time_s, rests_.load(std::memory_order_relaxed));
   for (std::size_t i = 0; i < due.count; ++i) {
     ToolState tool = due.states[i];
     tool.stamp = {++tool_sequence_, epoch_, tool.stamp.stamp_ns};

@@ -9,13 +9,13 @@
 
 #include "haptics_node/device/haptic_device.h"
 #include "haptics_node/device/operated_device.h"
-#include "haptics_node/node/bell.h"
 #include "haptics_node/node/tool_thinner.h"
 #include "haptics_node/servo/servo.h"
 #include "services/base/core/messages.h"
 #include "services/base/core/operator_choice.h"
 #include "services/base/core/scene_view.h"
 #include "services/base/core/tick.h"
+#include "services/base/runtime/bell.h"
 #include "services/base/runtime/histogram.h"
 #include "services/base/runtime/seqlock.h"
 #include "services/base/runtime/spsc_ring.h"
@@ -33,7 +33,8 @@ class HapticsNode {
     bus::Input<OperatorInput>& operator_input;
     bus::Output<ToolState>& tool_state;
     bus::Output<TickManifest>& tick_manifest;
-    std::shared_ptr<Bell> bell = std::make_shared<Bell>();  ///< To be rung when a message has arrived.
+    std::shared_ptr<runtime::Bell> bell =
+        std::make_shared<runtime::Bell>();  ///< To be rung when a message has arrived.
   };
 
   /// Scene and ports must outlive the node. A tool without a device is not published.
@@ -45,6 +46,12 @@ class HapticsNode {
 
   /// Servo thread, each millisecond. Does not wait, lock, allocate, log or throw.
   void ServoStep(const Tick& tick) noexcept;
+  /// After ServoStep: time until which further steps would find nothing new [CLOCK_MONOTONIC, ns]: at most
+  /// ToolThinner::kLongRest_ns after that step, less before a simulated hand moves; its time while a tool is operated,
+  /// moves or is near tissue. Under the same conditions.
+  [[nodiscard]] std::int64_t ServoRestsUntil() const noexcept;
+  /// Rung when a contact model has contacts.
+  [[nodiscard]] runtime::Bell* servo_bell() { return &servo_bell_; }
 
   /// Bus thread, each millisecond, at rest after Rest(): newest contact model in, records of the servo out. In a replay
   /// or a test, call it before and after ServoStep() on one thread.
@@ -57,8 +64,8 @@ class HapticsNode {
   [[nodiscard]] bool rests() const { return rests_.load(std::memory_order_relaxed); }
   /// The same, for any thread.
   [[nodiscard]] const std::atomic<bool>* resting() const { return &rests_; }
-  /// While the node rests: waits until the next sample is due, at most ToolThinner::kMostTicks ticks; less if a tool
-  /// moves or the bell rings. BusStep() is to follow. Bus thread.
+  /// While the node rests: waits until the next sample is due, at most ToolThinner::kLongRest_ns; less if a tool moves
+  /// or the bell rings. BusStep() is to follow. Bus thread.
   void Rest();
 
   /// State hash of the servo after the newest tick that BusStep() has published. Bus thread.
@@ -94,10 +101,12 @@ class HapticsNode {
   runtime::Histogram motion_to_force_;
   std::atomic<std::uint64_t> models_not_taken_{0}, inputs_not_taken_{0}, records_lost_{0};
 
+  runtime::Bell servo_bell_;
   std::atomic<bool> rests_{false};  ///< Relaxed: a tick that misses a change is followed by one that does not.
 
   // Servo thread only.
   ToolState last_tools_;
+  bool stays_ = false;  ///< No tool has changed in the newest tick.
   ContactModel arrived_;
   OperatorInput input_;
   TickRecord tick_;

@@ -10,6 +10,7 @@ namespace {
 constexpr double kShortestDt_s = 4e-3;  // Of physics: below it four samples a step are all ticks.
 // The next tick is expected as long after this one as this after the last, and a little later.
 constexpr double kLongestTick_s = 2e-3, kLater_s = 5e-5;
+constexpr std::int64_t kHalfTick_ns = 500'000;
 
 bool SameKind(const ToolSample& a, const ToolSample& b) {
   return a.kind == b.kind && a.state == b.state && a.buttons == b.buttons;
@@ -50,7 +51,7 @@ bool ToolThinner::IsAsked(double session_time_s) {
   return passes(last_s, session_time_s, 0.5 * dt_s_) || passes(session_time_s, next_s + kLater_s, dt_s_);
 }
 
-const ToolThinner::Due& ToolThinner::Add(const ToolState& tools, double session_time_s) {
+const ToolThinner::Due& ToolThinner::Add(const ToolState& tools, double session_time_s, bool calm) {
   due_.count = 0;
   const bool asked = IsAsked(session_time_s);
   if (!begun_) {
@@ -58,12 +59,13 @@ const ToolThinner::Due& ToolThinner::Add(const ToolState& tools, double session_
     Publish(tools);
     return due_;
   }
-  const bool rested = rest_ticks_ == count_;
+  const bool rested = rested_;
   if (rested && AreAtRest(tools, published_)) {
-    between_[count_++] = tools;
-    ++rest_ticks_;
+    between_[0] = tools;
+    count_ = 1;
     ++still_ticks_;
-    if (count_ == kMostTicks) Publish(tools);
+    const std::int64_t since_ns = tools.stamp.stamp_ns - published_.stamp.stamp_ns;
+    if (since_ns + kHalfTick_ns >= (calm ? kLongRest_ns : kShortRest_ns)) Publish(tools);
     return due_;
   }
   still_ticks_ = 0;
@@ -74,6 +76,7 @@ const ToolThinner::Due& ToolThinner::Add(const ToolState& tools, double session_
     Publish(tools);
   } else {
     between_[count_++] = tools;
+    rested_ = false;
   }
   return due_;
 }
@@ -94,7 +97,8 @@ bool ToolThinner::Fits(const ToolState& end) const {
 void ToolThinner::Publish(const ToolState& tools) {
   due_.states[due_.count++] = tools;
   published_ = tools;
-  count_ = rest_ticks_ = 0;
+  count_ = 0;
+  rested_ = true;
 }
 
 }  // namespace fulcrum::haptics

@@ -15,8 +15,9 @@ namespace fulcrum::haptics {
 
 class ToolThinner {
  public:
-  /// Longest time between two samples [ticks].
+  /// Longest time between two samples [ticks], and [ns] while nothing moves: short, and where no reader waits for one.
   static constexpr std::size_t kMostTicks = 10;
+  static constexpr std::int64_t kShortRest_ns = 10'000'000, kLongRest_ns = 40'000'000;
   /// Largest errors of the tip, of the rotation and of the force, at any tick, of a reader that interpolates.
   static constexpr float kSamePlace_m = 5e-6f, kSameTurn_rad = 4e-4f, kSameForce_N = 0.01f;
 
@@ -30,11 +31,12 @@ class ToolThinner {
   };
   /// Adds the tools of the next tick. Returns what is to be published now. Stamps keep their time; epoch and sequence
   /// are the publisher's.
-  const Due& Add(const ToolState& tools, double session_time_s);
+  /// @param calm no tool is near tissue: tools at rest are published each kLongRest_ns.
+  const Due& Add(const ToolState& tools, double session_time_s, bool calm);
   /// Newest ticks in which nothing has changed.
   [[nodiscard]] std::size_t still_ticks() const { return still_ticks_; }
-  /// Ticks after which the next state is published, if nothing changes until then.
-  [[nodiscard]] std::size_t ticks_to_next() const { return kMostTicks - count_; }
+  /// Stamp of the newest published state [ns].
+  [[nodiscard]] std::int64_t published_ns() const { return published_.stamp.stamp_ns; }
 
  private:
   [[nodiscard]] bool IsAsked(double session_time_s);
@@ -45,9 +47,9 @@ class ToolThinner {
   double last_s_ = 0;   ///< Session time of the newest tick.
   bool begun_ = false;  ///< A state has been published.
   ToolState published_;
-  std::array<ToolState, kMostTicks> between_;  ///< Of the ticks since, oldest first.
+  std::array<ToolState, kMostTicks> between_;  ///< Of the ticks since, oldest first; at rest the newest alone.
   std::size_t count_ = 0;                      ///< Of these.
-  std::size_t rest_ticks_ = 0;                 ///< Ticks since, all of them like the published one.
+  bool rested_ = true;                         ///< All ticks since are like the published one.
   std::size_t still_ticks_ = 0;
   Due due_;
 };

@@ -11,10 +11,10 @@ void AgeMachine::OnModel(std::int64_t t_s_ns, std::int64_t now_ns) noexcept {
   last_model_ns_ = now_ns;
 }
 
-void AgeMachine::Step(std::int64_t t_s_ns, std::int64_t now_ns, double dt) noexcept {
+void AgeMachine::Step(std::int64_t t_s_ns, bool contacts, std::int64_t now_ns, double dt) noexcept {
   const std::int64_t age = now_ns - t_s_ns;
   const bool lost = t_s_ns == 0 || age > kHoldAge_ns;
-  old_ = !lost && age > kNormalAge_ns;
+  old_ = !lost && contacts && age > kNormalAge_ns;
   if (lost && state_ != ServoState::kOff && state_ != ServoState::kFade) {
     state_ = ServoState::kFade;
     fresh_ = 0;  // Earlier models do not count.

@@ -20,8 +20,9 @@ class AgeMachine {
  public:
   /// Registers a model that has passed the gate.
   void OnModel(std::int64_t t_s_ns, std::int64_t now_ns) noexcept;
-  /// Once per tick. `t_s_ns`: time of the model in use, 0 when there is none.
-  void Step(std::int64_t t_s_ns, std::int64_t now_ns, double dt) noexcept;
+  /// Once per tick. `t_s_ns`: time of the model in use, 0 when there is none. `contacts`: it has some; one without
+  /// holds no force, and comes each 40 ms only while nothing moves.
+  void Step(std::int64_t t_s_ns, bool contacts, std::int64_t now_ns, double dt) noexcept;
 
   [[nodiscard]] ServoState state() const noexcept { return state_; }
   /// Share of the force that is rendered, 0 … 1; its time derivative is continuous.

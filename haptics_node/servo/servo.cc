@@ -60,7 +60,7 @@ void Servo::Step(const Tick& tick) noexcept {
   last_stamp_ns_ = tick.stamp_ns;
   for (Channel& channel : channels_) ReadDevice(&channel, tick);
   TakePendingModel(tick.stamp_ns);
-  age_.Step(model_time_ns_, tick.stamp_ns, dt_);
+  age_.Step(model_time_ns_, model_contacts_, tick.stamp_ns, dt_);
   for (Channel& channel : channels_) Render(&channel, tick);
   FillRecord(tick);
 }
@@ -89,8 +89,9 @@ void Servo::TakePendingModel(std::int64_t now_ns) noexcept {
     channel.external_W = pending_.devices[i].p_ext_W;
   }
   model_time_ns_ = pending_.tool_stamp_ns;
-  if (std::any_of(pending_.devices.begin(), pending_.devices.end(),
-                  [](const auto& device) { return device.count > 0; })) {
+  model_contacts_ = std::any_of(pending_.devices.begin(), pending_.devices.end(),
+                                [](const auto& device) { return device.count > 0; });
+  if (model_contacts_) {
     figures_.motion_to_force_ns = now_ns - pending_.tool_stamp_ns;
     ++figures_.contacts_used;
   }

@@ -64,6 +64,10 @@ class Servo {
   void Step(const Tick& tick) noexcept;
 
   [[nodiscard]] const ServoRecord& record() const noexcept { return record_; }
+  /// Forces fade or rise.
+  [[nodiscard]] bool creeping() const noexcept {
+    return age_.state() == ServoState::kFade || age_.state() == ServoState::kRise;
+  }
   [[nodiscard]] const ServoFigures& figures() const noexcept { return figures_; }
 
  private:
@@ -101,6 +105,7 @@ class Servo {
   bool has_pending_ = false;
   bool model_offered_ = false;
   std::int64_t model_time_ns_ = 0;  ///< t_s of the model in use; 0: none.
+  bool model_contacts_ = false;     ///< It has contacts.
   std::int64_t last_stamp_ns_ = 0;
   double dt_ = 1e-3;  ///< Since the last tick [s].
   ServoRecord record_;

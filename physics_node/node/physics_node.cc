@@ -111,6 +111,7 @@ void PhysicsNode::TakeTools(std::int64_t now_ns) {
   tool_states_.DropBefore(now_ns);
   const ToolState& before = tool_states_.before();
   const ToolState& after = tool_states_.after() != nullptr ? *tool_states_.after() : before;
+  contact_rest_.Follow(before, after);
   const std::int64_t begin = before.stamp.stamp_ns, end = after.stamp.stamp_ns;
   const float u =
       end > begin ? std::clamp(static_cast<float>(now_ns - begin) / static_cast<float>(end - begin), 0.0f, 1.0f) : 0.0f;
@@ -228,7 +229,7 @@ void PhysicsNode::Step(const Tick& tick) {
   const StepReport report = simulation_.Step(inputs_, ticks_.count == 0 ? 1 : ticks_.periods);
   figures_.asleep_ticks.fetch_add(report.asleep ? 1 : 0, std::memory_order_relaxed);
   MeasurePace();
-  PublishContacts(tick);
+  PublishContacts(tick, report.asleep);
   PublishCautery(tick);
   PublishFrame(tick);
   Measure();
@@ -253,12 +254,13 @@ void PhysicsNode::MeasurePace() {
   }
 }
 
-void PhysicsNode::PublishContacts(const Tick& tick) {
+void PhysicsNode::PublishContacts(const Tick& tick, bool asleep) {
   // Without readers only where the solver provides the forces: otherwise slip needs those of the contact probe.
   if (scene_.physics.mode == PhysicsMode::kAccurate && !ports_.contacts.has_readers()) {
     for (std::uint32_t i = 0; i < kMaxTools; ++i) {
       NoteForce(i, static_cast<double>(simulation_.solver_force(i).norm()));
     }
+    contact_rest_.Decide(asleep, tick.index);
     return;
   }
   ContactModel model;
@@ -266,11 +268,11 @@ void PhysicsNode::PublishContacts(const Tick& tick) {
     model.devices[i] = simulation_.Contacts(i);
     NoteForce(i, TissueForce(model.devices[i]).norm());
     ToRealTime(pace_.value(), &model.devices[i]);
+    asleep = asleep && model.devices[i].count == 0;
   }
+  contact_rest_.Decide(asleep, tick.index);
   // The servo dates the model by the tool sample, so there is no model without one.
-  if (used_.tool_before.sequence == 0 || !ports_.contacts.has_readers()) {
-    return;
-  }
+  if (used_.tool_before.sequence == 0 || !ports_.contacts.has_readers() || !contact_rest_.due()) return;
   model.stamp = stampers_.contact.Next(tick.stamp_ns);
   model.tool_sequence = used_.tool_before.sequence;
   model.tool_stamp_ns = used_.pose_ns;
@@ -292,6 +294,7 @@ void PhysicsNode::PublishCautery(const Tick& tick) {
     return;
   }
   CauteryContact contact = simulation_.Cautery(hook_);
+  if (!contact_rest_.due() && !contact.touching && !contact.on_solid) return;
   contact.stamp = stampers_.cautery.Next(tick.stamp_ns);
   contact.session_time_s = time_.contact_s;
   contact.topology_revision = simulation_.model().revision();

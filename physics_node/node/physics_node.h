@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <span>
 
+#include "physics_node/node/contact_rest.h"
 #include "physics_node/node/input_history.h"
 #include "physics_node/simulation/tissue_simulation.h"
 #include "services/base/core/messages.h"
@@ -83,7 +84,7 @@ class PhysicsNode {
   void AdaptPreset(const Tick& tick);
   void MeasurePace();
   void PublishFrame(const Tick& tick);
-  void PublishContacts(const Tick& tick);
+  void PublishContacts(const Tick& tick, bool asleep);
   void NoteForce(std::size_t tool, double force_N);
   void PublishCautery(const Tick& tick);
   void PublishManifest(const Tick& tick);
@@ -113,6 +114,7 @@ class PhysicsNode {
     std::int64_t pose_ns = 0;  ///< Time of the tools' poses.
   };
   UsedSamples used_;
+  ContactRest contact_rest_;
   /// Of the last step.
   struct StepTime {
     double k = 0;

@@ -104,6 +104,23 @@ struct CyclicThread::Impl {
     return !stop.load(std::memory_order_relaxed);
   }
 
+  /// Waits as long as the callback's owner rests, and moves `*wake_ns` to the next period. Returns the periods omitted.
+  std::uint64_t Rest(std::int64_t* wake_ns) const {
+    if (!settings.rests_until) return 0;
+    const std::int64_t periods = (settings.rests_until() - *wake_ns) / settings.period_ns;
+    if (periods <= 0) return 0;
+    const std::int64_t end_ns = *wake_ns + periods * settings.period_ns;
+    for (std::int64_t now_ns = MonotonicNs(); now_ns < end_ns; now_ns = MonotonicNs()) {
+      const bool rung = settings.bell->WaitUntil(std::min(end_ns, now_ns + kMaxSleepNs));
+      if (!rung && !stop.load(std::memory_order_relaxed)) continue;
+      const NextPeriod next = PlanNextPeriod(*wake_ns - settings.period_ns, settings.period_ns, MonotonicNs());
+      *wake_ns = next.wake_ns;
+      return next.skipped;
+    }
+    *wake_ns = end_ns;
+    return static_cast<std::uint64_t>(periods);
+  }
+
   void Loop() {
     SetUpThread();
     Tick tick;
@@ -119,11 +136,12 @@ struct CyclicThread::Impl {
       callback(tick);
       const std::int64_t end = MonotonicNs();
       step.Add(end - begin);
-      ticks.store(ticks.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
       const NextPeriod next = PlanNextPeriod(wake_ns, settings.period_ns, end);
       overruns.store(overruns.load(std::memory_order_relaxed) + next.skipped, std::memory_order_relaxed);
-      tick.index += 1 + next.skipped;
       wake_ns = next.wake_ns;
+      const std::uint64_t omitted = Rest(&wake_ns);
+      ticks.store(ticks.load(std::memory_order_relaxed) + 1 + omitted, std::memory_order_relaxed);
+      tick.index += 1 + next.skipped + omitted;
     }
   }
 };

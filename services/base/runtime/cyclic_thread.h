@@ -9,6 +9,7 @@
 #include <string>
 
 #include "services/base/core/tick.h"
+#include "services/base/runtime/bell.h"
 #include "services/base/runtime/histogram.h"
 
 namespace fulcrum::runtime {
@@ -20,12 +21,17 @@ struct CyclicThreadSettings {
   std::int64_t spin_ns = 0;  ///< Longest time before a period for which the thread spins instead of sleeping.
   /// While true, nothing depends on the begin of a period to some microseconds: the thread does not spin. Outlives it.
   const std::atomic<bool>* rests = nullptr;
+  /// Called on the thread after each period: time until which nothing can happen [CLOCK_MONOTONIC, ns]. The thread
+  /// omits the periods that end before it, or until `bell` rings; they count as ticks, since none is late. Null: it
+  /// omits none. Given with `bell`, which outlives the thread.
+  std::function<std::int64_t()> rests_until;
+  Bell* bell = nullptr;
   int cpu = -1;  ///< CPU to which the thread is pinned; -1: any.
 };
 
 /// Snapshot that another thread may read at any time.
 struct CyclicStats {
-  std::uint64_t ticks = 0;
+  std::uint64_t ticks = 0;     ///< Periods run, or omitted at rest.
   std::uint64_t overruns = 0;  ///< Periods skipped.
   HistogramSnapshot wake;      ///< Lateness [ns].
   HistogramSnapshot step;      ///< Duration of the callback [ns].

@@ -213,6 +213,66 @@ TEST_F(HapticsNodeTest, RestsWhileNothingMovesAndNothingIsNear) {
   EXPECT_GT(rested.size(), 350u);
 }
 
+TEST_F(HapticsNodeTest, TheServoOfASimulatedHandRestsUntilItMoves) {
+  const Vec3f place(0, 0, 0.02f);
+  const std::array<ScriptKey, 3> late{
+      {{0.0f, 0, place, 0, 0, 0}, {0.5f, 0, place, 0, 0, 0}, {1.0f, 0, {0, 0, 0.01f}, 0, 0, 0}}};
+  scene.script = late;
+  const auto published = bus.tools.MakeInput(1024);
+  const auto run = [&](bool omits) {
+    node = Make(1000);
+    std::uint64_t steps = 0;
+    for (std::uint64_t ms = 0; ms < 600; ++ms, ++steps) {
+      node->BusStep();
+      node->ServoStep(TickAt(ms));
+      node->BusStep();
+      const std::int64_t rest_ns = node->ServoRestsUntil() - TickAt(ms).stamp_ns;
+      EXPECT_LE(rest_ns, ToolThinner::kLongRest_ns);
+      if (omits && rest_ns > 1'000'000) ms += static_cast<std::uint64_t>((rest_ns - 1) / 1'000'000);
+    }
+    EXPECT_EQ(omits, steps < 250) << steps;
+    ToolState state;
+    std::vector<ToolState> states;
+    while (published->TakeNext(&state)) states.push_back(state);
+    return states;
+  };
+  const std::vector<ToolState> all = run(false), few = run(true);
+  const auto moved = [&](const std::vector<ToolState>& states) {
+    return std::ranges::find_if(states, [&](const ToolState& s) { return s.tools[0].p_WT != place; });
+  };
+  ASSERT_NE(moved(all), all.end());
+  ASSERT_NE(moved(few), few.end());
+  EXPECT_EQ(moved(few)->stamp.stamp_ns, moved(all)->stamp.stamp_ns) << "the first motion is as early";
+  EXPECT_EQ(moved(few)->tools[0].p_WT, moved(all)->tools[0].p_WT);
+  EXPECT_EQ(std::prev(moved(few))->stamp.stamp_ns, std::prev(moved(all))->stamp.stamp_ns);
+  EXPECT_EQ(few.back().tools[0].p_WT, all.back().tools[0].p_WT);
+}
+
+TEST_F(HapticsNodeTest, AContactWakesTheServoAndATouchNeverLetsItRest) {
+  const std::array<ScriptKey, 1> still{{{0.0f, 0, {0, 0, 0.02f}, 0, 0, 0}}};
+  scene.script = still;
+  node = Make(1000);
+  std::uint64_t ms = 0;
+  for (; ms < 200; ++ms) {
+    node->ServoStep(TickAt(ms));
+    node->BusStep();
+  }
+  EXPECT_GT(node->ServoRestsUntil(), TickAt(ms - 1).stamp_ns);
+  ContactModel model;
+  model.stamp = {1, 1, TickAt(ms - 1).stamp_ns};
+  model.tool_stamp_ns = TickAt(ms - 1).stamp_ns;
+  model.physics_dt_s = 0.01f;
+  bus.model_out->Write(model);
+  node->BusStep();
+  EXPECT_FALSE(node->servo_bell()->WaitUntil(0)) << "no contact, nothing to feel";
+  model.stamp.sequence = 2;
+  model.devices[0].count = 1;
+  bus.model_out->Write(model);
+  node->BusStep();
+  EXPECT_TRUE(node->servo_bell()->WaitUntil(0));
+  EXPECT_EQ(node->ServoRestsUntil(), TickAt(ms - 1).stamp_ns);
+}
+
 /// Time that the bus thread rests [ms], while the servo takes the ticks from `begin` on.
 double RestOf(HapticsNode* node, const std::function<void()>& meanwhile) {
   const std::int64_t begin = runtime::MonotonicNs();
@@ -281,7 +341,7 @@ TEST_F(HapticsNodeTest, ARestIsNoLongerThanUntilTheNextSample) {
   }
   ASSERT_TRUE(node->rests());
   (void)RestOf(node.get(), [] {});
-  // Not before the newest tick; the next sample is at most ten ticks after it.
+  // Not before the newest tick; the next sample is at most 40 ms after it.
   EXPECT_GE(runtime::MonotonicNs(), now_ns + 399'000'000);
   EXPECT_LT(1e-6 * static_cast<double>(runtime::MonotonicNs() - now_ns), 5'000);
 }

@@ -22,7 +22,7 @@ struct NodeBus {
   std::unique_ptr<bus::Output<TickManifest>> manifest_out = manifests.MakeOutput();
   std::unique_ptr<bus::Input<TickManifest>> manifest_in = manifests.MakeInput(64);
 
-  std::shared_ptr<Bell> bell = std::make_shared<Bell>();
+  std::shared_ptr<runtime::Bell> bell = std::make_shared<runtime::Bell>();
 
   /// The node's.
   [[nodiscard]] HapticsNode::Ports ports() const { return {*model_in, *operator_in, *tool_out, *manifest_out, bell}; }

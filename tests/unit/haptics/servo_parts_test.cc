@@ -106,13 +106,14 @@ class AgeRun {
         model = now - 15 * kMs;
         machine.OnModel(model, now);
       }
-      machine.Step(model, now, kDt);
+      machine.Step(model, contacts, now, kDt);
       largest_gain_step = std::max(largest_gain_step, std::abs(machine.gain() - last_gain));
       last_gain = machine.gain();
     }
   }
   AgeMachine machine;
   std::int64_t now = 1000 * kMs, model = 0;
+  bool contacts = true;
   double last_gain = 0, largest_gain_step = 0;
 };
 
@@ -156,6 +157,18 @@ TEST(AgeMachine, HoldsAfter40MsFadesAfter100MsIn300Ms) {
   EXPECT_LE(run.now - newest, 402 * kMs);
 }
 
+TEST(AgeMachine, AModelWithoutContactsHoldsNothingAndFadesAsOneWithThem) {
+  AgeRun run;
+  run.contacts = false;
+  run.Run(400, true);
+  run.Run(85, false);  // 100 ms old.
+  EXPECT_EQ(run.machine.state(), ServoState::kNormal);
+  EXPECT_EQ(run.machine.damping(), 0.0);
+  run.contacts = true;
+  run.Run(1, false);
+  EXPECT_EQ(run.machine.state(), ServoState::kFade);
+}
+
 TEST(AgeMachine, ReturnNeedsThreeInARowAndContinuesFromWhereItFaded) {
   AgeRun run;
   run.Run(400, true);
@@ -178,7 +191,7 @@ TEST(AgeMachine, ModelsThatComeOldAreNoReasonToReturn) {
     run.now += 10 * kMs;
     run.model = run.now - 150 * kMs;
     run.machine.OnModel(run.model, run.now);
-    run.machine.Step(run.model, run.now, 0.01);
+    run.machine.Step(run.model, true, run.now, 0.01);
   }
   EXPECT_EQ(run.machine.gain(), 0.0);
 }

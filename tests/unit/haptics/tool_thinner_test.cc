@@ -19,7 +19,7 @@ constexpr double kDt_s = 0.01;
 struct Thinned {
   std::vector<ToolState> ticks, published;
 
-  Thinned(int count, const std::function<void(double, ToolSample*)>& move) {
+  Thinned(int count, const std::function<void(double, ToolSample*)>& move, bool calm = false) {
     ToolThinner thinner(kDt_s);
     for (int i = 0; i < count; ++i) {
       const Tick tick = TickAt(static_cast<std::uint64_t>(i));
@@ -28,7 +28,7 @@ struct Thinned {
       state.tools[0].kind = ToolKind::kGrasper;
       move(tick.session_time_s, &state.tools[0]);
       ticks.push_back(state);
-      const ToolThinner::Due& due = thinner.Add(state, tick.session_time_s);
+      const ToolThinner::Due& due = thinner.Add(state, tick.session_time_s, calm);
       for (std::size_t k = 0; k < due.count; ++k) published.push_back(due.states[k]);
     }
   }
@@ -68,6 +68,23 @@ TEST(ToolThinner, AToolAtRestIsPublishedEachTenthTickAndTheLastOneBeforeItMoves)
   ASSERT_NE(moves, thinned.published.end());
   EXPECT_NEAR(static_cast<double>(std::distance(thinned.published.begin(), moves)), 51, 2);
   EXPECT_LE(thinned.PlaceError(), ToolThinner::kSamePlace_m);
+}
+
+TEST(ToolThinner, FarFromTissueAToolAtRestIsPublishedEach40MsAndItsFirstMotionAtOnce) {
+  const auto move = [](double time_s, ToolSample* tool) {
+    tool->p_WT.x() = time_s < 0.5 ? 0 : 0.05f * static_cast<float>(time_s - 0.5);
+  };
+  const Thinned calm(1000, move, true), near(1000, move, false);
+  const auto first_moved = [](const Thinned& thinned) {
+    return std::ranges::find_if(thinned.published, [](const ToolState& s) { return s.tools[0].p_WT.x() > 0; });
+  };
+  const auto moves = first_moved(calm);
+  ASSERT_NE(moves, calm.published.end());
+  EXPECT_NEAR(static_cast<double>(std::distance(calm.published.begin(), moves)), 13.5, 2);
+  EXPECT_EQ(moves->stamp.stamp_ns, first_moved(near)->stamp.stamp_ns);
+  EXPECT_EQ(moves->stamp.stamp_ns - std::prev(moves)->stamp.stamp_ns,
+            first_moved(near)->stamp.stamp_ns - std::prev(first_moved(near))->stamp.stamp_ns);
+  EXPECT_LE(calm.PlaceError(), ToolThinner::kSamePlace_m);
 }
 
 TEST(ToolThinner, BetweenTheSamplesEachTickIsWhereAReaderInterpolates) {

@@ -129,6 +129,59 @@ TEST(CyclicThread, IndexCountsSkippedPeriodsAndStampsGrow) {
   EXPECT_GE(stats.step.max_ns, 3 * kPeriod);
 }
 
+TEST(CyclicThread, OmitsThePeriodsOfARestAndKeepsItsGrid) {
+  Bell bell;
+  std::vector<Tick> seen;
+  seen.reserve(1000);
+  constexpr std::int64_t kRest = 20 * kPeriod;
+  std::int64_t stamp_ns = 0;
+  const std::int64_t grid_ns = MonotonicNs();
+  CyclicThread thread({.name = "test",
+                       .period_ns = kPeriod,
+                       .rests_until = [&] { return seen.size() >= 3 ? stamp_ns + kRest : stamp_ns; },
+                       .bell = &bell},
+                      [&](const Tick& tick) {
+                        stamp_ns = tick.stamp_ns;
+                        if (seen.size() < seen.capacity()) seen.push_back(tick);
+                      });
+  thread.Start(grid_ns);
+  while (thread.stats().ticks < 200) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  thread.Stop();
+  ASSERT_GE(seen.size(), 8u);
+  EXPECT_LT(seen.size(), 20u) << "of 200 periods";
+  EXPECT_LT(seen[2].stamp_ns - seen[1].stamp_ns, kRest);
+  for (std::size_t i = 3; i < seen.size(); ++i) {
+    EXPECT_GT(seen[i].stamp_ns - seen[i - 1].stamp_ns, kRest - kPeriod);
+    // Each omitted period counts in the index: stamps stay on the grid, each within the lateness of its wake-up.
+    const auto periods = static_cast<std::int64_t>(seen[i].index - seen[0].index);
+    EXPECT_GE(seen[i].stamp_ns - grid_ns, periods * kPeriod);
+  }
+  EXPECT_GE(thread.stats().ticks, seen.back().index + 1 - thread.stats().overruns) << "omitted periods are ticks";
+  EXPECT_EQ(thread.stats().step.count, seen.size());
+}
+
+TEST(CyclicThread, ABellEndsARest) {
+  Bell bell;
+  std::atomic<int> calls{0};
+  std::atomic<std::int64_t> begun_ns{0};
+  constexpr std::int64_t kLong = 30'000'000'000;
+  CyclicThread thread(
+      {.name = "test", .period_ns = kPeriod, .rests_until = [&] { return begun_ns + kLong; }, .bell = &bell},
+      [&](const Tick& tick) {
+        begun_ns = tick.stamp_ns;
+        ++calls;
+      });
+  thread.Start();
+  while (calls < 1) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  std::this_thread::sleep_for(std::chrono::milliseconds(120));  // Longer than a slice of its sleep.
+  EXPECT_EQ(calls, 1);
+  bell.Ring();
+  while (calls < 2) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_LT(MonotonicNs() - begun_ns, kLong / 2);
+  thread.Stop();  // Within a slice, not at the end of the rest.
+  EXPECT_EQ(calls, 2);
+}
+
 TEST(CyclicThread, StopsAndStartsAgain) {
   std::atomic<int> calls{0};
   CyclicThread thread({.name = "test", .period_ns = kPeriod}, [&](const Tick&) { ++calls; });

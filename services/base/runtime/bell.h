@@ -1,4 +1,4 @@
-// Wakes the bus thread from its rest.
+// Wakes a thread from its rest.
 #pragma once
 
 #include <semaphore.h>
@@ -7,9 +7,9 @@
 #include <cstdint>
 #include <ctime>
 
-namespace fulcrum::haptics {
+namespace fulcrum::runtime {
 
-/// Ring() may be called on any thread, also the servo's: it neither waits nor allocates.
+/// Ring() may be called on any thread, also a real-time one: it neither waits nor allocates.
 class Bell {
  public:
   Bell() { ::sem_init(&semaphore_, 0, 0); }
@@ -22,11 +22,14 @@ class Bell {
   }
 
   /// Waits until Ring() has been called since the last wait, at most until `until_ns` (CLOCK_MONOTONIC). One thread.
-  void WaitUntil(std::int64_t until_ns) {
+  /// Returns whether it has been called.
+  bool WaitUntil(std::int64_t until_ns) noexcept {
     constexpr std::int64_t kSecond_ns = 1'000'000'000;
     const timespec until{static_cast<time_t>(until_ns / kSecond_ns), static_cast<long>(until_ns % kSecond_ns)};
+    if (::sem_clockwait(&semaphore_, CLOCK_MONOTONIC, &until) != 0) return false;
     // A call before this store is not counted again: what it tells of is there already.
-    if (::sem_clockwait(&semaphore_, CLOCK_MONOTONIC, &until) == 0) rung_.store(false);
+    rung_.store(false);
+    return true;
   }
 
  private:
@@ -34,4 +37,4 @@ class Bell {
   sem_t semaphore_;
 };
 
-}  // namespace fulcrum::haptics
+}  // namespace fulcrum::runtime
