@@ -21,6 +21,7 @@ constexpr float kRimRadii[] = {0.0005f, 0.0008f};  // [m]
 constexpr float kVessel = 0.75f;                   // Of the pattern: from 0.5 on, a slit of 30 mm bled in six places.
 constexpr std::uint8_t kSealed = 128;
 constexpr float kSameVessel_m = 0.006f;
+constexpr double kCutOffAgain_s = 0.5;
 
 }  // namespace
 
@@ -52,6 +53,26 @@ std::optional<Vec2f> Bleeding::LivingVessel(const Vec2f& material, const Atlas& 
 void Bleeding::SetClips(std::span<const Clip> clips) {
   supply_.SetClips(clips);
   clips_changed_ = true;
+  cut_off_known_ = false;
+}
+
+bool Bleeding::FindCutOff(const Atlas& atlas, double session_time_s) {
+  if (!supply_.has_clips() && cut_off_.empty()) return false;
+  const bool recut =
+      atlas.removals() != cut_off_removals_ && std::abs(session_time_s - cut_off_found_s_) >= kCutOffAgain_s;
+  if (cut_off_known_ && !recut) return false;
+  cut_off_known_ = true;
+  cut_off_removals_ = atlas.removals();
+  cut_off_found_s_ = session_time_s;
+  const auto width = static_cast<std::size_t>(atlas.film_width());
+  cut_off_.assign(width * static_cast<std::size_t>(atlas.film_height()), 0);
+  const float texel_m = 2 * atlas.texel_m();
+  supply_.ForEachCutOff(atlas, [&](const Vec2f& material) {
+    const auto x = static_cast<std::size_t>(material.x() / texel_m),
+               y = static_cast<std::size_t>(material.y() / texel_m);
+    if (x < width && y * width + x < cut_off_.size()) cut_off_[y * width + x] = 255;
+  });
+  return true;
 }
 
 void Bleeding::StopCutOff(const Atlas& atlas) {

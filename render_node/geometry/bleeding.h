@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "render_node/geometry/atlas.h"
 #include "render_node/geometry/membrane_mesh.h"
@@ -34,6 +35,12 @@ class Bleeding {
   /// on at the new rim. Sources close that heat has sealed (damage above a half there) or that have bled for 8 s.
   /// Returns whether the film of the atlas has changed.
   bool Update(double session_time_s, const MembraneMesh& membrane, std::span<const WorkingTube> tubes, Atlas* atlas);
+
+  /// Finds anew which vessels clips have cut off, after a change of clips and, half a second apart, of cuts. Returns
+  /// true where the answer may be another one.
+  bool FindCutOff(const Atlas& atlas, double session_time_s);
+  /// Per texel of the atlas' film: 255 where a vessel is cut off. Empty before the first clip.
+  [[nodiscard]] std::span<const std::uint8_t> cut_off() const { return cut_off_; }
 
   [[nodiscard]] int sources() const;
   /// Something bleeds or flows: the next Update will change the film.
@@ -64,6 +71,10 @@ class Bleeding {
   VesselSupply supply_;
   bool clips_changed_ = false;
   std::uint64_t removals_ = 0;  // Of the atlas when clips were last taken into account.
+  std::vector<std::uint8_t> cut_off_;
+  bool cut_off_known_ = true;
+  std::uint64_t cut_off_removals_ = 0;
+  double cut_off_found_s_ = 0;  // Session time.
   SheetFluid fluid_;
   std::array<Source, 8> sources_;
   std::size_t next_source_ = 0;

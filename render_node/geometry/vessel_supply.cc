@@ -25,6 +25,10 @@ bool Inside(const Vec2f& p, const std::array<Vec2f, 3>& t) {
   return (a >= 0 && b >= 0 && c >= 0) || (a <= 0 && b <= 0 && c <= 0);
 }
 
+Vec2f MiddleOf(int x, int y, float texel_m) {
+  return texel_m * Vec2f(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+}
+
 }  // namespace
 
 float VesselSupply::VesselAt(const Vec2f& material) const {
@@ -61,8 +65,59 @@ bool VesselSupply::Closed(const Vec2f& material) const {
 
 bool VesselSupply::CutOff(const Vec2f& material, const Atlas& atlas) {
   if (!has_clips()) return false;
+  Ends ends = Flood(material, atlas, Tissue::kLiving);
+  Forget();
+  if (ends.supplied || ends.at_clip) return !ends.supplied;
+  if (ends.farthest_m > kPiece_m) return false;  // A vessel that only ends.
+  ends = Flood(material, atlas, Tissue::kLivingOrLost);
+  Forget();
+  return ends.at_clip;
+}
+
+void VesselSupply::Forget() {
+  for (const auto& [x, y] : filled_) seen_[TexelIndex(x, y, width_)] = 0;
+}
+
+bool VesselSupply::Carries(int x, int y, const Atlas& atlas, Tissue tissue) const {
+  const std::uint8_t* texel = atlas.texels().data() + 4 * TexelIndex(x, y, atlas.width());
+  const bool living = texel[3] >= kRemoved && texel[1] < kSealed;
+  return (living || tissue == Tissue::kLivingOrLost) && VesselAt(MiddleOf(x, y, atlas.texel_m())) >= kVessel;
+}
+
+void VesselSupply::ForEachCutOff(const Atlas& atlas, const std::function<void(const Vec2f& material)>& visit) {
+  const float texel_m = atlas.texel_m();
+  const float beside_m = kClosed_m + 2 * texel_m;
+  // A vessel that has been visited is not visited again from another one of its texels beside a clip.
+  std::vector<std::uint8_t> known(static_cast<std::size_t>(atlas.width()) * static_cast<std::size_t>(atlas.height()));
+  for (const std::array<Vec2f, 3>& t : closed_) {
+    const Vec2f low = t[0].cwiseMin(t[1]).cwiseMin(t[2]), high = t[0].cwiseMax(t[1]).cwiseMax(t[2]);
+    const auto first = [&](float metres) { return std::max(1, static_cast<int>((metres - beside_m) / texel_m)); };
+    const auto last = [&](float metres, int count) {
+      return std::min(count - 2, static_cast<int>((metres + beside_m) / texel_m));
+    };
+    for (int y = first(low.y()); y <= last(high.y(), atlas.height()); ++y) {
+      for (int x = first(low.x()); x <= last(high.x(), atlas.width()); ++x) {
+        const Vec2f place = MiddleOf(x, y, texel_m);
+        if (known[TexelIndex(x, y, atlas.width())] != 0 || !Carries(x, y, atlas, Tissue::kLiving) || Closed(place))
+          continue;
+        const Ends ends = Flood(place, atlas, Tissue::kLiving);
+        const bool cut_off = ends.at_clip && !ends.supplied;
+        for (const auto& [u, v] : filled_) {
+          const Vec2f at = MiddleOf(u, v, texel_m);
+          if (Closed(at)) continue;  // It may lie beside another vessel, too.
+          known[TexelIndex(u, v, atlas.width())] = 1;
+          if (cut_off) visit(at);
+        }
+        Forget();
+      }
+    }
+  }
+}
+
+VesselSupply::Ends VesselSupply::Flood(const Vec2f& material, const Atlas& atlas, Tissue tissue) {
   const float texel_m = atlas.texel_m();
   const int width = atlas.width(), height = atlas.height();
+  width_ = width;
   seen_.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   filled_.clear();
   const auto push = [&](int x, int y) {
@@ -72,26 +127,23 @@ bool VesselSupply::CutOff(const Vec2f& material, const Atlas& atlas) {
   };
   push(std::clamp(static_cast<int>(material.x() / texel_m), 0, width - 1),
        std::clamp(static_cast<int>(material.y() / texel_m), 0, height - 1));
-  bool reached = false, at_clip = false;
-  for (std::size_t k = 0; k < filled_.size() && !reached; ++k) {
+  Ends ends;
+  for (std::size_t k = 0; k < filled_.size() && !ends.supplied; ++k) {
     const auto [x, y] = filled_[k];
-    const Vec2f place = texel_m * Vec2f(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+    const Vec2f place = MiddleOf(x, y, texel_m);
     if (Closed(place)) {
-      at_clip = true;
+      ends.at_clip = true;
       continue;
     }
-    reached = x == 0 || y == 0 || x == width - 1 || y == height - 1 || (place - material).norm() > kSupply_m;
-    for (int v = y - 1; v <= y + 1 && !reached; ++v) {
+    ends.farthest_m = std::max(ends.farthest_m, (place - material).norm());
+    ends.supplied = x == 0 || y == 0 || x == width - 1 || y == height - 1 || ends.farthest_m > kSupply_m;
+    for (int v = y - 1; v <= y + 1 && !ends.supplied; ++v) {
       for (int u = x - 1; u <= x + 1; ++u) {
-        const std::uint8_t* texel = atlas.texels().data() + 4 * TexelIndex(u, v, width);
-        if (texel[3] < kRemoved || texel[1] >= kSealed) continue;
-        const Vec2f next = texel_m * Vec2f(static_cast<float>(u) + 0.5f, static_cast<float>(v) + 0.5f);
-        if (VesselAt(next) >= kVessel) push(u, v);
+        if (Carries(u, v, atlas, tissue)) push(u, v);
       }
     }
   }
-  for (const auto& [x, y] : filled_) seen_[TexelIndex(x, y, width)] = 0;
-  return at_clip && !reached;
+  return ends;
 }
 
 }  // namespace fulcrum::render

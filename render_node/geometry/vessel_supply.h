@@ -2,12 +2,14 @@
 // triangle of its anchors, in the sheet's own coordinates (s, t), if all three are nodes of sheets. A place is cut off
 // if blood from a clip's far side alone could reach it: the living tissue of vessels that is joined to it ends at clips
 // before it leaves the circle of kSupply_m around it or the sheet. Vessels may join, so one that has a way around the
-// clips is not cut off. Assumed: any vessel that goes on for kSupply_m is supplied there, and one that only ends is not
-// what the clips cut off (without a clip every vessel bleeds). Pure.
+// clips is not cut off. A piece within kPiece_m that cuts have separated from a vessel with a clip is cut off as well.
+// Assumed: any vessel that goes on for kSupply_m is supplied there, and one that only ends is not what the clips cut
+// off (without a clip every vessel bleeds). Pure.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -21,6 +23,9 @@ class VesselSupply {
  public:
   static constexpr float kClosed_m = 0.001f;
   static constexpr float kSupply_m = 0.025f;
+  /// A living piece that ends within this distance may be what cuts have separated [m]: clips to cut between are about
+  /// twice as far apart.
+  static constexpr float kPiece_m = 0.004f;
   /// Density of the pattern from which on blood flows there: all but the thinnest branches, which end soon.
   static constexpr float kVessel = 0.75f;
 
@@ -41,7 +46,20 @@ class VesselSupply {
   /// none.
   [[nodiscard]] bool CutOff(const Vec2f& material, const Atlas& atlas);
 
+  /// visit(material) for the texels [m] of the vessels beside clips that are cut off. Visits each such vessel within
+  /// kSupply_m of a clip: milliseconds.
+  void ForEachCutOff(const Atlas& atlas, const std::function<void(const Vec2f& material)>& visit);
+
  private:
+  enum class Tissue { kLiving, kLivingOrLost };
+  struct Ends {
+    bool supplied = false, at_clip = false;
+    float farthest_m = 0;  ///< From where it began.
+  };
+  /// Follows a vessel; its texels remain in filled_ and seen_ until Forget().
+  [[nodiscard]] Ends Flood(const Vec2f& material, const Atlas& atlas, Tissue tissue);
+  void Forget();
+  [[nodiscard]] bool Carries(int x, int y, const Atlas& atlas, Tissue tissue) const;
   [[nodiscard]] bool Closed(const Vec2f& material) const;
 
   SceneView scene_;
@@ -51,6 +69,7 @@ class VesselSupply {
   std::vector<std::array<Vec2f, 3>> closed_;  // Triangles of clips, (s, t) [m].
   std::vector<std::uint8_t> seen_;            // Per texel of the atlas; scratch, all 0 between calls.
   std::vector<std::array<int, 2>> filled_;    // Scratch.
+  int width_ = 0;                             // Of seen_.
 };
 
 }  // namespace fulcrum::render

@@ -456,6 +456,7 @@ void RenderNode::Draw(double session_time_s, bool write_png, ReadBack read) {
   NoteLatency(spent.count());
   draw_ms_.store(spent.count(), std::memory_order_relaxed);
   scale_.store(quality_.scale(), std::memory_order_relaxed);
+  shed_m3_.store(view_.shed_m3(), std::memory_order_relaxed);
 }
 
 /// Of a live picture that shows a new shape of the tissue: the age of the poses that made it, when the picture is
@@ -481,6 +482,9 @@ void RenderNode::FillHealth(Health* health) const {
   health->metrics.push_back({"draw_ms", draw_ms_.load(std::memory_order_relaxed)});
   if (const std::uint64_t refused = clips_dropped_.load(std::memory_order_relaxed)) {
     health->metrics.push_back({"clips_dropped", static_cast<double>(refused)});
+  }
+  if (const double shed_m3 = shed_m3_.load(std::memory_order_relaxed); shed_m3 > 0) {
+    health->metrics.push_back({"blood_ul", 1e9 * shed_m3});
   }
   runtime::AddQuantiles("motion_to_picture", motion_to_picture_.snapshot(), health);
   health->metrics.push_back({"scale", scale_.load(std::memory_order_relaxed)});

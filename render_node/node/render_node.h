@@ -225,6 +225,7 @@ class RenderNode {
   std::atomic<std::uint64_t> clips_dropped_{0};
   std::atomic<double> draw_ms_{0};
   runtime::Histogram motion_to_picture_;
+  std::atomic<double> shed_m3_{0};
   std::atomic<double> scale_{1};
   mutable std::mutex error_mutex_;
   std::string error_;

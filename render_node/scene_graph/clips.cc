@@ -1,5 +1,8 @@
 #include "render_node/scene_graph/clips.h"
 
+#include <algorithm>
+#include <utility>
+
 #include "render_node/geometry/solid.h"
 #include "render_node/scene_graph/mesh.h"
 #include "services/base/core/clips.h"
@@ -8,7 +11,7 @@ namespace fulcrum::render {
 
 void Clips::Set(std::span<const Clip> clips) {
   root_->removeChildren(0, root_->getNumChildren());
-  clips_.clear();
+  const std::vector<Placed> before = std::exchange(clips_, {});
   for (const Clip& clip : clips) {
     const Solid solid = TitaniumClip(clip.length_m);
     Mesh mesh("clip", false);
@@ -16,15 +19,24 @@ void Clips::Set(std::span<const Clip> clips) {
     mesh.SetNormals(solid.normals);
     mesh.SetColours(solid.colours);
     mesh.SetTriangles(solid.triangles);
-    Placed placed{clip, new osg::MatrixTransform, std::make_shared<MeshEdges>(solid.positions, solid.triangles)};
+    Placed& placed = clips_.emplace_back();
+    placed.clip = clip;
+    placed.body = new osg::MatrixTransform;
+    placed.edges = std::make_shared<MeshEdges>(solid.positions, solid.triangles);
+    // A clip that was there holds what it held.
+    const auto known = std::ranges::find_if(
+        before, [&](const Placed& old) { return old.clip.anchors == clip.anchors && old.clip.p_AC == clip.p_AC; });
+    if (known != before.end()) {
+      placed.footprint = known->footprint;
+      placed.footprint_known = known->footprint_known;
+    }
     placed.body->setNodeMask(0);
     placed.body->addChild(mesh.geometry());
     root_->addChild(placed.body);
-    clips_.push_back(std::move(placed));
   }
 }
 
-void Clips::Follow(std::span<const float> xyz) {
+bool Clips::Follow(std::span<const float> xyz, bool seen) {
   const auto at = [&](std::uint32_t k) { return Vec3f(xyz[3 * k], xyz[3 * k + 1], xyz[3 * k + 2]); };
   for (Placed& placed : clips_) {
     const auto& [a, b, c] = placed.clip.anchors;
@@ -37,7 +49,17 @@ void Clips::Follow(std::span<const float> xyz) {
     placed.body->setMatrix(osg::Matrix::rotate(osg::Quat(q.x(), q.y(), q.z(), q.w())) *
                            osg::Matrix::translate(p.x(), p.y(), p.z()));
     placed.body->setNodeMask(~0u);
+    if (!seen || placed.footprint_known) continue;
+    placed.footprint = FootprintOf(placed.clip, *pose, scene_, xyz);
+    placed.footprint_known = true;
   }
+  std::vector<ClipFootprint> now;
+  for (const Placed& placed : clips_) {
+    if (placed.footprint) now.push_back(*placed.footprint);
+  }
+  const bool changed = now != footprints_;
+  footprints_ = std::move(now);
+  return changed;
 }
 
 void Clips::AppendEdges(const Laparoscope& eye, const Vec2f& size, std::vector<EdgeLine>* lines) const {

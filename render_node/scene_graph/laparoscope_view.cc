@@ -63,6 +63,7 @@ struct LaparoscopeView::Impl {
   void BindTextures();
   void ShowFat();
   void CastShadows();
+  void FollowClips();
   void PlaceEyes();
   void ShineFrom(const Laparoscope& from);
   [[nodiscard]] std::vector<WorkingTube> Tubes() const;
@@ -113,6 +114,7 @@ LaparoscopeView::Impl::Impl(const SceneView& view, const Look& given)
       layers(view, eyes),
       surroundings(view, scope, look),
       instruments(view),
+      clips(view),
       shadow(view),
       bleeding(view, serosa, kSerosaTexels, kSerosaPerMetre, layers.rim()),
       overlay(view.stereo.layout, static_cast<int>(view.render.width), static_cast<int>(view.render.height)),
@@ -226,6 +228,10 @@ void LaparoscopeView::Impl::CastShadows() {
   shadow_mesh.SetTriangles(shadow.triangles());
 }
 
+void LaparoscopeView::Impl::FollowClips() {
+  if (clips.Follow(layers.particles(), layers.seen())) layers.Gather(clips.footprints());
+}
+
 LaparoscopeView::LaparoscopeView(const SceneView& scene, const Look& look)
     : impl_(std::make_unique<Impl>(scene, look)) {
   Update();
@@ -281,7 +287,7 @@ void LaparoscopeView::SetJaw(int tool, float angle_rad) {
 
 void LaparoscopeView::SetClips(std::span<const Clip> clips) {
   impl_->clips.Set(clips);
-  impl_->clips.Follow(impl_->layers.particles());
+  impl_->FollowClips();
   impl_->bleeding.SetClips(clips);
   impl_->optics.EdgesChanged();
 }
@@ -346,13 +352,11 @@ bool LaparoscopeView::DrawsBackgroundAtRest() const { return impl_->optics.Draws
 
 void LaparoscopeView::Update() {
   impl_->ShowFat();
+  impl_->FollowClips();
   if (impl_->layers.Update(impl_->atlas)) {
     impl_->optics.SceneChanged();
     impl_->tools_moved = true;
-    if (!impl_->clips.empty()) {
-      impl_->clips.Follow(impl_->layers.particles());
-      impl_->optics.EdgesChanged();
-    }
+    if (!impl_->clips.empty()) impl_->optics.EdgesChanged();
   }
   if (impl_->tools_moved) {
     impl_->CastShadows();
@@ -400,12 +404,13 @@ bool LaparoscopeView::UpdateEffects(double session_time_s) {
   impl_->optics.SetHaze(impl_->haze);
   const bool bled = impl_->bleeding.Update(session_time_s, impl_->layers.membrane(), tubes, &impl_->atlas);
   impl_->film_texture.Update(impl_->atlas.TakeFilmChange());
-  const bool changed = smoking || bled;
-  if (changed) {
-    impl_->optics.SceneChanged();
-  }
-  return changed || impl_->bleeding.moves();
+  const bool supplied = impl_->bleeding.FindCutOff(impl_->atlas, session_time_s);
+  if (supplied) impl_->layers.Pale(impl_->atlas, impl_->bleeding.cut_off());
+  if (smoking || bled || supplied) impl_->optics.SceneChanged();
+  return smoking || bled || impl_->bleeding.moves();
 }
+
+double LaparoscopeView::shed_m3() const { return impl_->bleeding.shed_m3(); }
 
 bool LaparoscopeView::HasFaded(double session_time_s) const {
   return impl_->smoke.HazeAt(session_time_s) != impl_->haze || impl_->bleeding.AgesAt(session_time_s);

@@ -52,6 +52,7 @@ class LaparoscopeView {
   void RehearseBurn(bool on);
   /// Advances smoke and blood. Returns true if the picture changes or will change by that, but for the haze.
   bool UpdateEffects(double session_time_s);
+  [[nodiscard]] double shed_m3() const;  ///< Blood that vessels have shed since the start [m^3].
   /// True if the haze of smoke or the age of clots is no longer that of the last UpdateEffects.
   [[nodiscard]] bool HasFaded(double session_time_s) const;
 

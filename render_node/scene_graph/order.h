@@ -21,9 +21,19 @@ enum class Order {
   kSmoke
 };
 
-/// Texture units; the samplers of all programs are bound once at the scene's root, but for the burns of solids, which
-/// most sessions do not have. Units 6, 7 and 9 are those of optics.cc and overlay.cc.
-enum TextureUnit { kAtlasUnit, kNoiseUnit, kSerosaUnit, kStructureUnit, kBurnUnit, kFilmUnit, kFatUnit = 8 };
+/// Texture units; the samplers of all programs are bound once at the scene's root, but for the burns of solids and
+/// vessels that clips have cut off, which most sessions do not have. Units 6, 7 and 9 are those of optics.cc and
+/// overlay.cc.
+enum TextureUnit {
+  kAtlasUnit,
+  kNoiseUnit,
+  kSerosaUnit,
+  kStructureUnit,
+  kBurnUnit,
+  kFilmUnit,
+  kFatUnit = 8,
+  kCutOffUnit = 10
+};
 
 inline void DrawIn(Order order, osg::StateSet* state) {
   state->setRenderBinDetails(static_cast<int>(order), "RenderBin");

@@ -7,6 +7,7 @@
 
 #include "render_node/geometry/sheet_detail.h"
 #include "render_node/geometry/surface.h"
+#include "render_node/scene_graph/atlas_texture.h"
 #include "render_node/scene_graph/program.h"
 #include "render_node/scene_graph/surroundings.h"
 #include "services/base/core/solid_charts.h"
@@ -24,6 +25,8 @@ constexpr float kRectumBehind = 0.0025f;     // [m] kBurnBehind of burn_layer.cc
 constexpr std::size_t kMostLinePoints = 64;  // As in membrane.frag.
 // [m] Margin of the box around a planned line outside which the shader skips the line.
 constexpr float kInkReach = 0.001f;
+// [m] From a clip within which tissue is drawn together, as kGather of membrane.frag.
+constexpr float kGather_m = 0.009f;
 constexpr float kFasciaDepth = 0.0006f;  // [m] Below the peritoneum: the least depth of the fat.
 
 /// The place in the middle of the eyes.
@@ -153,8 +156,14 @@ void TissueLayers::AddSheets() {
   touched_state_->addUniform(new osg::Uniform("around", osg::Vec4(around[0], around[1], around[2], around[3])));
   untouched_state_ = new osg::StateSet(*touched_state_);
   untouched_state_->setAttributeAndModes(MakeProgram("surface.vert", "membrane.frag", "UNTOUCHED"));
-  touched_state_->setAttributeAndModes(
-      MakeProgram("surface.vert", "membrane.frag", DrawsCuts(scene_) ? "" : "AS_PRINTED"));
+  const bool clipped = FindTool(scene_.tools, ToolKind::kClipApplier).has_value();
+  touched_state_->setAttributeAndModes(MakeProgram("surface.vert", "membrane.frag",
+                                                   !DrawsCuts(scene_) ? "AS_PRINTED"
+                                                   : clipped          ? "CLIPS"
+                                                                      : ""));
+  Gather({});
+  touched_state_->addUniform(new osg::Uniform("cut_off", static_cast<int>(kCutOffUnit)));
+  touched_state_->setTextureAttribute(kCutOffUnit, MakeTexture(1, 1, 1, {0}, false));
   AddPlannedLine();
   sheet_.push_back(std::make_unique<Mesh>("membrane", true));
   sheet_.front()->geometry()->setStateSet(untouched_state_);
@@ -183,9 +192,37 @@ void TissueLayers::AddPlannedLine() {
       "planned_box", osg::Vec4(low.x() - kInkReach, low.y() - kInkReach, high.x() + kInkReach, high.y() + kInkReach)));
 }
 
+void TissueLayers::Gather(std::span<const ClipFootprint> clips) {
+  const std::span<const ClipFootprint> drawn = clips.first(std::min(clips.size(), std::size_t{kMaxClips}));
+  gathered_.assign(drawn.begin(), drawn.end());
+  regathered_ = true;
+  if (gathered_.empty()) {
+    touched_state_->getOrCreateUniform("clip_count", osg::Uniform::INT)->set(0);
+    return;
+  }
+  osg::Uniform* lines = touched_state_->getOrCreateUniform("clip_lines", osg::Uniform::FLOAT_VEC4, kMaxClips);
+  for (std::size_t k = 0; k < gathered_.size(); ++k) {
+    const auto& [from, to] = gathered_[k];
+    lines->setElement(static_cast<unsigned>(k), osg::Vec4(from.x(), from.y(), to.x(), to.y()));
+  }
+  touched_state_->getOrCreateUniform("clip_count", osg::Uniform::INT)->set(static_cast<int>(gathered_.size()));
+}
+
+void TissueLayers::Pale(const Atlas& atlas, std::span<const std::uint8_t> cut_off) {
+  touched_state_->setTextureAttribute(
+      kCutOffUnit, MakeTexture(atlas.film_width(), atlas.film_height(), 1, {cut_off.begin(), cut_off.end()}, false));
+  const auto width = static_cast<std::size_t>(atlas.film_width());
+  pale_.setEmpty();
+  for (std::size_t k = 0; k < cut_off.size(); ++k) {
+    if (cut_off[k] == 0) continue;
+    pale_.extend(2 * atlas.texel_m() * Vec2f(static_cast<float>(k % width), static_cast<float>(k / width)));
+  }
+  regathered_ = true;
+}
+
 void TissueLayers::SetTissue(std::span<const float> xyz) {
   std::copy(xyz.begin(), xyz.end(), xyz_.begin());
-  tissue_changed_ = true;
+  tissue_changed_ = seen_ = true;
 }
 
 bool TissueLayers::SetTopology(const TopologyState& topology) {
@@ -283,8 +320,9 @@ void TissueLayers::UpdateSolids() {
 }
 
 bool TissueLayers::FindUntouched(const Atlas& atlas) {
-  if (marks_ == atlas.marks()) return false;
+  if (marks_ == atlas.marks() && !regathered_) return false;
   marks_ = atlas.marks();
+  regathered_ = false;
   const std::uint32_t rows = membrane_.block_rows(), cols = membrane_.block_cols();
   untouched_.assign(std::size_t{rows} * cols, 0);
   // The paper's colours are functions of the present temperature: nothing is left out.
@@ -295,7 +333,12 @@ bool TissueLayers::FindUntouched(const Atlas& atlas) {
     Eigen::AlignedBox2f box;
     detail_.ForEachNode(block, [&](Index node) { box.extend(scene_.membrane_material[node]); });
     const bool inked = !planned.isEmpty() && planned.exteriorDistance(box) <= kInkReach;
-    untouched_[block] = !inked && atlas.Untouched(box.min(), box.max()) ? 1 : 0;
+    const bool gathered = std::ranges::any_of(gathered_, [&](const ClipFootprint& clip) {
+      const Eigen::AlignedBox2f around(clip.from.cwiseMin(clip.to), clip.from.cwiseMax(clip.to));
+      return around.exteriorDistance(box) <= kGather_m;
+    });
+    const bool pale = !pale_.isEmpty() && pale_.exteriorDistance(box) <= Atlas::kReach_m;
+    untouched_[block] = !inked && !gathered && !pale && atlas.Untouched(box.min(), box.max()) ? 1 : 0;
   }
   return true;
 }

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "render_node/geometry/clip_footprint.h"
 #include "render_node/geometry/fat_layer.h"
 #include "render_node/geometry/field_of_view.h"
 #include "render_node/geometry/membrane_mesh.h"
@@ -44,6 +45,10 @@ class TissueLayers {
   /// Adds what only a burn shows, so that its shaders are compiled, or removes it: all fat as bared and, where solids
   /// burn, a piece of burnt tissue in front of everything (BurnLayer::Rehearse), and a piece of a lip.
   void RehearseBurn(bool on);
+  /// Draws the sheets' tissue together along these lines, the first kMaxClips. Needs a scene with a clip applier.
+  void Gather(std::span<const ClipFootprint> clips);
+  /// Draws the vessels dark and thin whose texels in `cut_off` are not 0: one byte for each texel of the atlas' film.
+  void Pale(const Atlas& atlas, std::span<const std::uint8_t> cut_off);
   /// Updates the meshes. Returns false if nothing has changed. @param atlas of the sheet.
   bool Update(const Atlas& atlas);
 
@@ -51,6 +56,7 @@ class TissueLayers {
   [[nodiscard]] std::span<const float> rim() const { return rim_; }  ///< Of SheetRim().
   [[nodiscard]] const BurnAtlas& burn_atlas() const { return burn_.atlas(); }
   [[nodiscard]] std::span<const float> particles() const { return xyz_; }  ///< Last argument of SetTissue.
+  [[nodiscard]] bool seen() const { return seen_; }                        ///< SetTissue has been called.
   [[nodiscard]] osg::Geode* node() const { return geode_; }
 
  private:
@@ -99,6 +105,9 @@ class TissueLayers {
   SheetRuns chosen_, shown_;             // The membrane's triangles at the level of detail needed; those that are seen.
   std::vector<std::uint8_t> untouched_;  // Per block of the membrane's mesh.
   std::uint64_t marks_ = ~std::uint64_t{0};  // Atlas::marks() of untouched_.
+  std::vector<ClipFootprint> gathered_;      // Of Gather().
+  Eigen::AlignedBox2f pale_;                 // Around what Pale() shows, (s, t) [m].
+  bool seen_ = false, regathered_ = false;
   // The membrane: meshes over the arrays of the first one, a run of triangles each.
   std::vector<std::unique_ptr<Mesh>> sheet_;
   osg::ref_ptr<osg::StateSet> touched_state_, untouched_state_;

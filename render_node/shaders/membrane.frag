@@ -25,6 +25,49 @@ uniform vec2 planned_line[64];         // [m] of the sheet.
 uniform vec4 planned_box;              // Bounding box of the line's ink: lowest and highest (s, t).
 out vec4 fragment;
 
+#ifdef CLIPS // Scenes with a clip applier.
+uniform sampler2D cut_off; // 1 where clips have cut a vessel off from its supply.
+uniform int clip_count;
+uniform vec4 clip_lines[16]; // Where clips hold the sheet: ends of a line, (s, t) [m] (geometry/clip_footprint.h).
+const float kGather = 0.009; // [m] From a clip within which tissue is drawn together.
+
+// Tissue that a clip draws together. away: distance from the nearest line [m]. height: of the folds that run towards it
+// [m]; valley: 1 at their bottom. drawn: offset in (s, t) [m] to the place that the pull has brought here. uneven: noise.
+void Gathered(vec2 m, float uneven, out float away, out float height, out float valley, out vec2 drawn) {
+  away = kGather;
+  height = 0.0;
+  valley = 0.0;
+  drawn = vec2(0.0);
+  for (int i = 0; i < clip_count; ++i) {
+    vec2 line = clip_lines[i].zw - clip_lines[i].xy;
+    float reach = 0.5 * max(length(line), 2e-3);
+    vec2 along = line / max(length(line), 1e-6), p = m - 0.5 * (clip_lines[i].xy + clip_lines[i].zw);
+    vec2 q = vec2(dot(p, along), dot(p, vec2(-along.y, along.x)));
+    float d = length(vec2(max(abs(q.x) - reach, 0.0), q.y));
+    if (d >= kGather) continue;
+    float w = 1.0 - d / kGather;
+    w *= w;
+    // Folds are lines of equal angle about a point behind the line: on it a millimetre apart, and fanned out from there.
+    float fan = atan(q.x, abs(q.y) + reach) + 0.4 * (uneven - 0.5);
+    float turn = sin(7.0 * fan + 1.7 * clamp(q.y / 1e-3, -1.0, 1.0) + 0.9 * float(i));
+    float rise = sqrt(turn * turn + 0.012) * (0.7 + 0.3 * sin(5.0 * fan)); // Round ridges, narrow valleys.
+    height += 3.4e-4 * w * rise;
+    valley = max(valley, w * (1.1 - rise));
+    drawn += along * (0.35 * q.x * w);
+    away = min(away, d);
+  }
+}
+
+// Normal of a surface of normal n with a relief of `height` [m] (Mikkelsen 2010).
+vec3 Raised(vec3 n, float height) {
+  vec3 across = dFdx(position), up = dFdy(position);
+  vec3 r1 = cross(up, n), r2 = cross(n, across);
+  float size = dot(across, r1);
+  vec3 slope = sign(size) * (dFdx(height) * r1 + dFdy(height) * r2);
+  return normalize(abs(size) * n - slope);
+}
+#endif
+
 // Ink of the planned line: dashes half a millimetre wide.
 float PlannedInk(vec2 m) {
   float edge = 0.5 * (fwidth(m.x) + fwidth(m.y)) + 5e-5; // Before any branch, which derivatives require.
@@ -56,7 +99,18 @@ vec2 ToFascia(vec2 m, vec3 n) {
 void main() {
   vec2 m = coordinate.xy;
   vec2 m_fascia = m + ToFascia(m, normalize(normal));
-  vec4 noise = texture(serosa_pattern, m * 16.0);
+#ifdef CLIPS
+  float away, height, valley;
+  vec2 drawn;
+  Gathered(m, texture(serosa_pattern, m * 31.0).g, away, height, valley, drawn);
+  float gathered = 1.0 - away / kGather;
+  float pinched = 1.0 - smoothstep(0.0008, 0.0032, away);
+  vec3 upright = Raised(normalize(normal), height);
+#else
+  vec3 upright = normal;
+  const vec2 drawn = vec2(0.0);
+#endif
+  vec4 noise = texture(serosa_pattern, (m + drawn) * 16.0);
 #ifdef UNTOUCHED // What follows from these constants is left out by the compiler.
   const vec4 heat = vec4(0.0, 0.0, 0.0, 1.0), heat_below = heat, wet_film = vec4(0.0);
   const float edge = 0.0, ink = 0.0, colour_by_temperature = 0.0;
@@ -77,14 +131,22 @@ void main() {
   float ink = PlannedInk(m);
 #endif
   float vessel = noise.a;
+#ifdef CLIPS
+  // What is left in a vessel without supply has given off its oxygen.
+  float still = texture(cut_off, m * film_per_metre).r;
+  vec3 in_vessel = mix(vec3(0.46, 0.03, 0.03), vec3(0.25, 0.06, 0.12), still);
+  vessel *= 1.0 - 0.35 * still;
+#else
+  const vec3 in_vessel = vec3(0.46, 0.03, 0.03);
+#endif
   float celsius = 20.0 + 127.5 * heat.r;
   float damage = heat.g;
   float dry = clamp(2.0 * heat.b, 0.0, 1.0);
   float burnt = clamp(2.0 * heat.b - 1.0, 0.0, 1.0);
 
   vec3 bend = noise.rgb - 0.5;
-  vec3 n = normalize(normal + 0.12 * bend);
-  vec3 film = normalize(normal + 0.40 * bend + 0.80 * (texture(serosa_pattern, m * 115.0).rgb - 0.5));
+  vec3 n = normalize(upright + 0.12 * bend);
+  vec3 film = normalize(upright + 0.40 * bend + 0.80 * (texture(serosa_pattern, m * 115.0).rgb - 0.5));
   float facing = abs(dot(n, normalize(position)));
   float grazing = (1.0 - facing) * (1.0 - facing);
   vec3 albedo = mix(vec3(0.84, 0.40, 0.30), vec3(0.90, 0.60, 0.45), noise.g);
@@ -98,8 +160,14 @@ void main() {
   float living = 1.0 - smoothstep(0.05, 0.5, damage);
   // Warm tissue reddens, then pales as its protein coagulates (from about 60 degrees).
   albedo = mix(albedo, vec3(0.72, 0.16, 0.13), 0.5 * living * smoothstep(41.0, 50.0, celsius));
-  albedo = mix(albedo, vec3(0.46, 0.03, 0.03), 0.8 * vessel * living);
+  albedo = mix(albedo, in_vessel, 0.8 * vessel * living);
   alpha = mix(alpha, max(alpha, 0.60), vessel * living);
+#ifdef CLIPS
+  // Tissue that is drawn together is thick, redder around and drained of blood beside the legs.
+  albedo = mix(albedo, vec3(0.74, 0.24, 0.19), 0.35 * gathered * (1.0 - pinched) * living);
+  albedo = mix(albedo, vec3(0.94, 0.79, 0.69), 0.80 * pinched * living);
+  alpha = mix(alpha, max(alpha, 0.75), smoothstep(0.1, 0.8, gathered));
+#endif
   float pale = max(smoothstep(0.05, 0.55, damage), smoothstep(58.0, 75.0, celsius));
   albedo = mix(albedo, vec3(0.92, 0.82, 0.66), pale);
   alpha = mix(alpha, 0.80, pale);
@@ -129,6 +197,13 @@ void main() {
   film = normalize(mix(film, normal + (0.5 + 0.6 * clot) * bend, bloody));
 #endif
 
+#ifdef CLIPS
+  // Little light reaches the bottom of the folds, and the tissue beside the metal.
+  float dark = max(0.80 * smoothstep(0.12, 0.7, valley), 0.95 * (1.0 - smoothstep(0.0005, 0.0019, away)));
+  albedo *= 1.0 - dark * vec3(0.75, 0.95, 0.95);
+#else
+  const float dark = 0.0;
+#endif
   float wet = mix(1.6 * (1.0 - 0.92 * max(brown, 0.3 * pale)), 1.8 - 1.0 * clot, bloody);
   // Water darkens a little, and is smoother than the tissue's own film.
   float rinsed = smoothstep(0.0, 0.25, wet_film.a);
@@ -137,10 +212,11 @@ void main() {
   film = normalize(mix(film, normal + 0.35 * bend, rinsed));
 #endif
   wet += 0.7 * rinsed;
+  wet *= 1.0 - dark;
 
   // The fascia's fibres run obliquely across the organ with varying density; burns of the peritoneum apply to them as
   // well.
-  vec4 fibres = texture(serosa_pattern, vec2(dot(m_fascia, vec2(22.0, 9.0)), dot(m_fascia, vec2(-65.0, 130.0))));
+  vec4 fibres = texture(serosa_pattern, vec2(dot(m_fascia + drawn, vec2(22.0, 9.0)), dot(m_fascia + drawn, vec2(-65.0, 130.0))));
   float strand = smoothstep(0.44, 0.70, fibres.r) * (0.3 + 1.2 * fibres.g * noise.b);
   float seared = smoothstep(0.02, 0.4, 2.0 * heat_below.b);
   float tanned = 0.6 * smoothstep(0.1, 0.5, heat_below.g);

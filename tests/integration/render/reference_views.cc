@@ -1,13 +1,16 @@
 // Draws the reference views of the documentation from recorded sessions, one JPEG sheet with a line under each:
 //
-//   reference_views OUT.jpg RECORDING [RECORDING_OF_OPENHELP]
+//   reference_views OUT.jpg RECORDING [RECORDING_OF_OPENHELP [RECORDING_OF_CLIPS]]
 //
-// The scenes are those beside the recordings (scene.fulcrum). RECORDING is of the script of built-in, at least 24 s.
+// The scenes are those beside the recordings (scene.fulcrum). RECORDING is of the script of built-in, at least 24 s,
+// RECORDING_OF_CLIPS of that of clips, at least 16 s. "-" leaves the views of a recording out.
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <optional>
+#include <numeric>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -28,6 +31,9 @@ struct View {
   float fov_deg = 60;
 };
 
+// Middle between the clips, frame W [m].
+const Vec3f kClipped_m(-0.005f, -0.013f, 0.021f);
+
 // Times and places are those of the script of built-in (deploy/scenes/built-in.yaml).
 const std::vector<View> kViews{
     {"at rest", 0.5, Vec3f::Zero(), Vec3f::Zero()},
@@ -42,6 +48,18 @@ const std::vector<View> kViews{
     {"beneath the tent", 12.0, {-0.004f, -0.004f, 0.020f}, {0.030f, -0.060f, 0.026f}, 32},
     {"instruments close", 11.0, {-0.004f, -0.002f, 0.028f}, {0.010f, -0.060f, 0.050f}, 30},
 };
+
+// Those of the script of clips (deploy/scenes/clips.yaml).
+const std::vector<View> kClipViews{
+    {"clip applier", 8.5, Vec3f::Zero(), Vec3f::Zero()},
+    {"clipped", 10.3, kClipped_m, {0.010f, -0.050f, 0.055f}, 17},
+    {"divided between clips", 15.2, kClipped_m, {0.010f, -0.050f, 0.055f}, 17},
+};
+
+constexpr double kAtTheEnd_s = -1;
+const std::vector<View> kOpenHelpViews{{"OpenHELP", kAtTheEnd_s, Vec3f::Zero(), Vec3f::Zero()}};
+/// Instead of a recording: none.
+constexpr const char* kNone = "-";
 
 render::Bitmap Draw(replay::Projector* projector, const RenderParams& scene, const View& view) {
   RenderParams camera = scene;
@@ -117,43 +135,44 @@ SceneView Sized(SceneView scene) {
   return scene;
 }
 
-void DrawAll(int argc, char** argv) {
-  Sheet sheet(kViews.size() + (argc > 3 ? 1 : 0));
-  {
-    const std::filesystem::path recording = argv[2];
-    const scene::SceneFile file(recording.parent_path() / "scene.fulcrum");
-    const SceneView scene = Sized(file.view());
-    std::optional<replay::Projector> projector(std::in_place, recording, scene);
-    std::vector<const View*> order;
-    for (const View& view : kViews) order.push_back(&view);
-    // A step back begins at the start of the recording.
-    std::ranges::stable_sort(order, {}, &View::time_s);
-    std::vector<render::Bitmap> pictures(kViews.size());
-    for (const View* view : order) {
-      pictures[static_cast<std::size_t>(view - kViews.data())] = Draw(&*projector, scene.render, *view);
-    }
-    for (std::size_t i = 0; i < pictures.size(); ++i) sheet.Add(pictures[i], kViews[i].caption);
+/// Adds the views of a recording to the sheet.
+void AddAll(const std::filesystem::path& recording, std::vector<View> views, Sheet* sheet) {
+  const scene::SceneFile file(recording.parent_path() / "scene.fulcrum");
+  const SceneView scene = Sized(file.view());
+  replay::Projector projector(recording, scene);
+  for (View& view : views) {
+    if (view.time_s == kAtTheEnd_s) view.time_s = projector.end_s();
   }
-  if (argc > 3) {
-    const std::filesystem::path recording = argv[3];
-    const scene::SceneFile file(recording.parent_path() / "scene.fulcrum");
-    const SceneView scene = Sized(file.view());
-    replay::Projector projector(recording, scene);
-    sheet.Add(Draw(&projector, scene.render, {"", projector.end_s(), Vec3f::Zero(), Vec3f::Zero()}), "OpenHELP");
+  // A step back begins at the start of the recording.
+  std::vector<std::size_t> order(views.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return views[i].time_s; });
+  std::vector<render::Bitmap> pictures(views.size());
+  for (const std::size_t i : order) pictures[i] = Draw(&projector, scene.render, views[i]);
+  for (std::size_t i = 0; i < views.size(); ++i) sheet->Add(pictures[i], views[i].caption);
+}
+
+void DrawAll(std::span<const std::string> recordings, const std::filesystem::path& out) {
+  const std::array<const std::vector<View>*, 3> views{&kViews, &kOpenHelpViews, &kClipViews};
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < recordings.size(); ++i) count += recordings[i] == kNone ? 0 : views[i]->size();
+  Sheet sheet(count);
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    if (recordings[i] != kNone) AddAll(recordings[i], *views[i], &sheet);
   }
-  sheet.Save(argv[1]);
+  sheet.Save(out);
 }
 
 }  // namespace
 }  // namespace fulcrum
 
 int main(int argc, char** argv) {
-  if (argc < 3) {
-    std::cerr << "usage: reference_views OUT.jpg RECORDING [RECORDING_OF_OPENHELP]\n";
+  if (argc < 3 || argc > 5) {
+    std::cerr << "usage: reference_views OUT.jpg RECORDING [RECORDING_OF_OPENHELP [RECORDING_OF_CLIPS]]\n";
     return 2;
   }
   try {
-    fulcrum::DrawAll(argc, argv);
+    fulcrum::DrawAll(std::vector<std::string>(argv + 2, argv + argc), argv[1]);
   } catch (const std::exception& error) {
     std::cerr << "reference_views: " << error.what() << '\n';
     return 1;

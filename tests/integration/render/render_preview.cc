@@ -68,6 +68,7 @@ int main(int argc, char** argv) {
       laparoscope.SetTool(tool, moment.tools.tools[static_cast<std::size_t>(tool)]);
       laparoscope.SetJaw(tool, moment.handles.handles[static_cast<std::size_t>(tool)].jaw_angle_rad);
     }
+    if (!clipped.clips.empty()) (void)laparoscope.UpdateEffects(0);
     laparoscope.Update();
     for (const Vec2f& place : moment.cut_path) {
       if (bleeds_s > 0) laparoscope.OpenVessels(place, 0);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -49,21 +50,23 @@ class VesselSupplyTest : public testing::Test {
   }
 
   /// Removes the tissue of a slit across the vessel and reports the cut.
-  void Cut(double time_s) {
+  void Cut(double time_s, float behind_m = 0) {
     TemperaturePatch patch;
     const auto texel = [&](float metres) { return static_cast<std::uint32_t>(metres / atlas_.texel_m()); };
     patch.header.origin_x = texel(kVessel_s) - 128;
-    patch.header.origin_y = texel(kCut_t) - 128;
+    patch.header.origin_y = texel(kCut_t + behind_m) - 128;
     patch.texels.assign(4u * kPatchTexels * kPatchTexels, 0);
     for (std::uint32_t y = 0; y < kPatchTexels; ++y) {
       for (std::uint32_t x = 0; x < kPatchTexels; ++x) {
-        const bool removed = x > 108 && x < 148 && y > 124 && y < 132;  // 4 mm x 0.7 mm.
+        const float above = static_cast<float>(y) + behind_m / atlas_.texel_m();
+        const bool before = behind_m > 0 && above > 124 && above < 132;
+        const bool removed = x > 108 && x < 148 && ((y > 124 && y < 132) || before);  // 4 mm x 0.7 mm.
         patch.texels[4 * (y * kPatchTexels + x)] = 34;
         patch.texels[4 * (y * kPatchTexels + x) + 3] = removed ? 0 : 255;
       }
     }
     ASSERT_FALSE(atlas_.Apply(patch).empty());
-    bleeding_->Cut({kVessel_s, kCut_t}, atlas_, time_s);
+    bleeding_->Cut({kVessel_s, kCut_t + behind_m}, atlas_, time_s);
   }
   bool Update(double time_s) { return bleeding_->Update(time_s, membrane_, {}, &atlas_); }
   /// Blood that lies nearer than 4 mm to the vessel's end before or behind the cut (t lower or higher).
@@ -148,6 +151,67 @@ TEST_F(VesselSupplyTest, AVesselThatJoinsAnotherOneBetweenTheClipsBleeds) {
   bleeding_->SetClips(std::vector{ClipAt(kVessel_s, kCut_t - 0.0035f), ClipAt(kVessel_s, kCut_t + 0.0045f)});
   Cut(1);
   EXPECT_EQ(bleeding_->sources(), 1);
+}
+
+/// Shares of the vessel's length that are shown without supply: before the first clip, between the two, behind.
+TEST_F(VesselSupplyTest, ShowsWhatIsCutOff) {
+  VesselSupply supply(view_, pattern_, kTexels, kPerMetre);
+  const float before_t = kCut_t - 0.006f, behind_t = kCut_t + 0.006f;
+  const auto lengths = [&](const std::vector<Clip>& clips) {
+    supply.SetClips(clips);
+    std::array<int, 3> texels{};
+    supply.ForEachCutOff(atlas_, [&](const Vec2f& place) {
+      EXPECT_NEAR(place.x(), kVessel_s, 6e-4f);
+      ++texels[place.y() < before_t ? 0 : place.y() < behind_t ? 1 : 2];
+    });
+    return texels;
+  };
+  const Clip first = ClipAt(kVessel_s, before_t), second = ClipAt(kVessel_s, behind_t);
+  EXPECT_EQ(lengths({}), (std::array<int, 3>{}));
+  EXPECT_EQ(lengths({first}), (std::array<int, 3>{})) << "supplied from either side";
+  const auto both = lengths({first, second});
+  EXPECT_EQ(both[0] + both[2], 0) << "supplied";
+  EXPECT_GT(both[1], 6e-3f / atlas_.texel_m()) << "between the clips, except what they hold";
+  Cut(1);
+  const auto stump = lengths({first});
+  EXPECT_EQ(stump[0] + stump[2], 0);
+  EXPECT_GT(stump[1], 0) << "from the clip to the cut";
+  EXPECT_LT(stump[1], both[1] / 2);
+  EXPECT_EQ(lengths({first, second})[0], 0);
+}
+
+TEST_F(VesselSupplyTest, LooksAgainAfterAChangeOfClipsAndHalfASecondAfterCuts) {
+  EXPECT_FALSE(bleeding_->FindCutOff(atlas_, 0.5)) << "without clips nothing is done";
+  EXPECT_TRUE(bleeding_->cut_off().empty());
+  const auto shown = [&] { return std::ranges::count(bleeding_->cut_off(), std::uint8_t{255}); };
+  bleeding_->SetClips(std::vector{ClipAt(kVessel_s, kCut_t - 0.006f)});
+  EXPECT_TRUE(bleeding_->FindCutOff(atlas_, 1));
+  EXPECT_EQ(shown(), 0);
+  EXPECT_FALSE(bleeding_->FindCutOff(atlas_, 2)) << "nothing has changed";
+  Cut(2);
+  EXPECT_TRUE(bleeding_->FindCutOff(atlas_, 2));
+  const auto stump = shown();
+  EXPECT_GT(stump, 0);
+  bleeding_->SetClips({});
+  EXPECT_TRUE(bleeding_->FindCutOff(atlas_, 2.1)) << "of clips at once";
+  EXPECT_EQ(shown(), 0);
+}
+
+TEST_F(VesselSupplyTest, APieceThatCutsHaveSeparatedFromItsClippedVesselDoesNotBleed) {
+  Cut(1);
+  Cut(1, 0.002f);  // And a second slit behind the first.
+  const Vec2f piece(kVessel_s, kCut_t + 0.001f);
+  VesselSupply supply(view_, pattern_, kTexels, kPerMetre);
+  const Clip before = ClipAt(kVessel_s, kCut_t - 0.0045f), behind = ClipAt(kVessel_s, kCut_t + 0.0075f);
+  supply.SetClips(std::vector{before, behind});
+  EXPECT_TRUE(supply.CutOff(piece, atlas_));
+  supply.SetClips(std::vector{ClipAt(kVessel_s + 0.01f, kCut_t)});
+  EXPECT_FALSE(supply.CutOff(piece, atlas_)) << "a clip on another vessel";
+  // The vessel behind the second slit only ends, 12 mm away, and counts as supplied.
+  for (int y = Column(kCut_t + 0.014f); y < kTexels; ++y)
+    pattern_[4 * static_cast<std::size_t>(y * kTexels + Column(kVessel_s)) + 3] = 0;
+  supply.SetClips(std::vector{before});
+  EXPECT_FALSE(supply.CutOff({kVessel_s, kCut_t + 0.004f}, atlas_));
 }
 
 TEST_F(VesselSupplyTest, AClipOnASolidClosesNoVesselOfTheSheet) {
