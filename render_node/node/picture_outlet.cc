@@ -2,8 +2,10 @@
 
 namespace fulcrum::render {
 
-PictureOutlet::PictureOutlet(const std::filesystem::path& folder, bus::LoanOutput<Picture>* pictures)
-    : writer_(folder), stream_(pictures != nullptr ? std::make_unique<PictureStream>(pictures) : nullptr) {}
+PictureOutlet::PictureOutlet(const std::filesystem::path& folder, std::uint64_t keep_free_B,
+                             bus::LoanOutput<Picture>* pictures)
+    : writer_(folder, keep_free_B),
+      stream_(pictures != nullptr ? std::make_unique<PictureStream>(pictures) : nullptr) {}
 
 void PictureOutlet::Give(const Bitmap& picture, const Use& use) {
   if (use.live) stream_->Add(picture, use.header);

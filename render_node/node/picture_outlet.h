@@ -24,8 +24,9 @@ class PictureOutlet {
     PictureHeader header;       ///< Of the live picture.
   };
 
-  /// @param folder of the files; empty: none. @param pictures null: no live pictures; must outlive the outlet.
-  PictureOutlet(const std::filesystem::path& folder, bus::LoanOutput<Picture>* pictures);
+  /// @param folder of the files; empty: none. @param keep_free_B as for FrameWriter. @param pictures null: no live
+  /// pictures; must outlive the outlet.
+  PictureOutlet(const std::filesystem::path& folder, std::uint64_t keep_free_B, bus::LoanOutput<Picture>* pictures);
 
   [[nodiscard]] bool has_folder() const { return writer_.has_folder(); }
   [[nodiscard]] bool has_readers() const { return stream_ && stream_->has_readers(); }

@@ -38,7 +38,7 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
       view_(stage_->view),
       display_(*stage_->display),
       shape_{0, 0, static_cast<int>(scene.render.width), static_cast<int>(scene.render.height)},
-      outlet_(settings.frames, ports.pictures),
+      outlet_(settings.frames, settings.keep_free_B, ports.pictures),
       quality_(settings.quality, static_cast<int>(scene.render.height), display_.is_gpu()),
       smooths_(settings.quality == Quality::kHigh && display_.can_smooth()),
       operator_stamper_(runtime::MonotonicNs()),

@@ -53,6 +53,7 @@ struct RenderSettings {
   std::filesystem::path frames;      ///< Folder for the pictures; empty: no files.
   InputSettings inputs = {};         ///< Gamepads as hands.
   Look look = {};                    ///< Of a stage that the node makes.
+  std::uint64_t keep_free_B = 0;     ///< Space that the pictures leave free on their disk [B].
 };
 
 class RenderNode {

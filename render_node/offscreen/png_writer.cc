@@ -48,7 +48,8 @@ Bitmap ReadPng(const std::filesystem::path& file) {
   return picture;
 }
 
-FrameWriter::FrameWriter(const std::filesystem::path& folder) : folder_(folder) {
+FrameWriter::FrameWriter(const std::filesystem::path& folder, std::uint64_t keep_free_B)
+    : folder_(folder), keep_free_B_(keep_free_B) {
   if (folder_.empty()) return;
   std::filesystem::create_directories(folder_);
   thread_ = std::thread([this] { Work(); });
@@ -95,6 +96,21 @@ std::string FrameWriter::last_error() const {
   return last_error_;
 }
 
+void FrameWriter::WriteOne(const Job& job) const {
+  std::error_code unknown;
+  const std::filesystem::space_info space = std::filesystem::space(folder_, unknown);
+  if (!unknown && space.available < keep_free_B_) {
+    throw std::runtime_error("no pictures are written: " + std::to_string(space.available / 1'000'000) +
+                             " MB are free on the disk of " + folder_.string() + ", and " +
+                             std::to_string(keep_free_B_ / 1'000'000) +
+                             " MB (half of recorder.keep_free_MB of the cart file) stay free for report and score; "
+                             "delete old sessions");
+  }
+  std::array<char, 32> name;
+  std::snprintf(name.data(), name.size(), "frame_%07d.png", static_cast<int>(std::lround(1000 * job.session_time_s)));
+  WritePng(job.picture, folder_ / name.data());
+}
+
 void FrameWriter::Work() {
   std::unique_lock lock(mutex_);
   for (;;) {
@@ -106,11 +122,9 @@ void FrameWriter::Work() {
     jobs_.pop_front();
     writing_ = true;
     lock.unlock();
-    std::array<char, 32> name;
-    std::snprintf(name.data(), name.size(), "frame_%07d.png", static_cast<int>(std::lround(1000 * job.session_time_s)));
     std::string error;
     try {
-      WritePng(job.picture, folder_ / name.data());
+      WriteOne(job);
     } catch (const std::exception& failure) {
       error = failure.what();
     }

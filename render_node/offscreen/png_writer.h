@@ -27,7 +27,9 @@ class FrameWriter {
  public:
   /// @param folder empty: there are no files, and no picture may be added. Throws std::runtime_error if the folder
   /// cannot be created.
-  explicit FrameWriter(const std::filesystem::path& folder);
+  /// @param keep_free_B space that stays free on the disk for others [B]: a picture for which there is less is not
+  /// written and counts as failed.
+  explicit FrameWriter(const std::filesystem::path& folder, std::uint64_t keep_free_B = 0);
   ~FrameWriter();  ///< Writes all queued pictures, then ends the thread.
   FrameWriter(const FrameWriter&) = delete;
   FrameWriter& operator=(const FrameWriter&) = delete;
@@ -49,8 +51,11 @@ class FrameWriter {
     double session_time_s;
   };
   void Work();
+  /// Throws std::runtime_error when the picture cannot be written.
+  void WriteOne(const Job& job) const;
 
   std::filesystem::path folder_;
+  std::uint64_t keep_free_B_;
   mutable std::mutex mutex_;
   std::condition_variable wake_, idle_;
   std::deque<Job> jobs_;

@@ -56,7 +56,7 @@ class PictureOutletTest : public testing::Test {
   std::filesystem::path folder_ =
       std::filesystem::temp_directory_path() / ("picture_outlet_" + std::to_string(::getpid()));
   LateDisplay display_;
-  PictureOutlet outlet_{folder_, nullptr};
+  PictureOutlet outlet_{folder_, 0, nullptr};
 };
 
 TEST_F(PictureOutletTest, APictureIsGivenOnceAndWithItsOwnTime) {
@@ -73,6 +73,20 @@ TEST_F(PictureOutletTest, APictureIsGivenOnceAndWithItsOwnTime) {
   outlet_.Collect(true, &display_);
   EXPECT_EQ(Files().size(), 2u);
   EXPECT_EQ(outlet_.lost(), 0u);
+}
+
+TEST_F(PictureOutletTest, PicturesLeaveSpaceOnTheDisk) {
+  const std::filesystem::path full = folder_ / "full";
+  PictureOutlet outlet{full, std::filesystem::space(folder_).available + 1'000'000'000, nullptr};
+  const Bitmap picture{16, 16, std::vector<std::uint8_t>(std::size_t{3} * 16 * 16, 99)};
+  outlet.Give(picture, {.file = true, .session_time_s = 1, .header = {}});
+  outlet.WaitForFiles();
+  EXPECT_TRUE(std::filesystem::is_empty(full));
+  Health health;
+  const std::string error = outlet.FillHealth(&health);
+  EXPECT_NE(error.find("recorder.keep_free_MB"), std::string::npos) << error;
+  EXPECT_EQ(health.metrics[1].name, "png_failed");
+  EXPECT_EQ(health.metrics[1].value, 1);
 }
 
 TEST_F(PictureOutletTest, WhatCannotBeReadIsCounted) {
