@@ -5,6 +5,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <boost/property_tree/json_parser.hpp>
 #include <boost/property_tree/ptree.hpp>
 #include <cstdlib>
@@ -185,7 +186,7 @@ TEST_F(InstallTest, UnitsPassTheCheckOfSystemd) {
                                               "=" + root_.string() + "/usr/");
     if (copy.parent_path() == units) arguments.push_back(copy);
   }
-  ASSERT_EQ(arguments.size(), 4u + 9u) << "a target, the supervisor, the console, six nodes";
+  ASSERT_EQ(arguments.size(), 4u + 10u) << "a target, the supervisor, the console, the host, six nodes";
   EXPECT_EQ(Output("/usr/bin/env", arguments), "") << "systemd reports errors in the units";
 }
 
@@ -216,6 +217,44 @@ TEST_F(InstallTest, UnitsLimitWhatEachNodeMayDo) {
     }
     EXPECT_EQ(unit.Values("DeviceAllow").empty(), unit.Value("PrivateDevices") == "yes") << node;
   }
+}
+
+/// Whether one of the key's values has the word.
+bool Names(const UnitFile& unit, const std::string& key, const std::string& word) {
+  for (const std::string& value : unit.Values(key)) {
+    const std::vector<std::string> words = testing::SplitWords(value);
+    if (std::find(words.begin(), words.end(), word) != words.end()) return true;
+  }
+  return false;
+}
+
+// DeviceAllow= of a kind of device whose driver is not loaded yet is ignored until the unit starts again.
+TEST_F(InstallTest, AHandleMayBePluggedInAfterItsUnitHasStarted) {
+  const std::map<std::string, std::string> drivers{{"char-ttyUSB", "modprobe@usbserial.service"},
+                                                   {"char-ttyACM", "modprobe@cdc_acm.service"}};
+  int found = 0;
+  for (const auto& entry : fs::directory_iterator(root_ / "lib/systemd/system")) {
+    if (entry.path().extension() != ".service") continue;
+    const UnitFile unit = Unit(entry.path().filename());
+    for (const auto& [device, driver] : drivers) {
+      if (!Names(unit, "DeviceAllow", device)) continue;
+      ++found;
+      EXPECT_TRUE(Names(unit, "Wants", driver)) << entry.path() << " " << driver;
+      EXPECT_TRUE(Names(unit, "After", driver)) << entry.path() << " " << driver;
+    }
+  }
+  EXPECT_EQ(found, 7) << "handle-bridge, console and host both, haptics one";
+}
+
+TEST_F(InstallTest, WhatServesOtherMachinesSaysHowTheyReachIt) {
+  const std::string settings = ReadFile(root_ / "etc/default/fulcrum");
+  for (const std::string unit : {"fulcrum-console.service", "fulcrum-host.service"}) {
+    EXPECT_NE(settings.find(unit + ".d/20-lab.conf"), std::string::npos) << unit;
+    EXPECT_NE(ReadFile(UnitPath(unit)).find(unit + ".d/20-lab.conf"), std::string::npos) << unit;
+  }
+  EXPECT_NE(settings.find("IPAddressAllow="), std::string::npos);
+  // A host ends with each session.
+  EXPECT_EQ(Unit("fulcrum-host.service").Value("Restart"), "always");
 }
 
 TEST_F(InstallTest, SessionRunsFromTheInstalledPlaces) {
