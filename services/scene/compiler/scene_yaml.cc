@@ -388,6 +388,8 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const MaterialLibr
   for (int i = 0; i < kMaxTools; ++i) {
     const std::string key = "tool" + std::to_string(i);
     ReadTool(tools.MapOrDefaults(key), folders, scene.render, &scene.tools[i], &scene.tool_meshes[i]);
+    const auto hooks = std::ranges::count(scene.tools, ToolKind::kHook, &ToolDescription::kind);
+    if (hooks > 1) tools.Fail(key, "is a second hook; a scene has one, because one current flows");
   }
   ReadPhysics(root.MapOrDefaults("physics"), &scene.physics);
   for (std::size_t i = 0; i < sheets.size(); ++i) {

@@ -227,6 +227,7 @@ const Rule kRules[] = {
     {"TimeBeyondTheEnd", "time_s: 5.4", "time_s: 7", {"time_s", "0 to 6"}},
     {"TimeBackwards", "time_s: 0.6", "time_s: 0.0", {"time_s", "follow one another"}},
     {"ToolKind", "kind: grasper", "kind: spoon", {"tools.tool0.kind", "scissors"}},
+    {"TwoHooks", "tool0: {kind: grasper,", "tool0: {kind: hook,", {"tools.tool1", "second hook"}},
     {"NoTrocar", "kind: grasper, trocar_mm: [-75, -45, 110]", "kind: grasper", {"trocar_mm"}},
     {"ScriptWithoutTool", "tool1: {kind: hook, trocar_mm: [97, 0, 47]}", "tool1: {kind: none}", {"no tool1"}},
     {"StructureLists", "t: [0, 0.3, 0.6, 1]", "t: [0, 1]", {"structures", "as many entries as s"}},
