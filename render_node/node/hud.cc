@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <string_view>
 
+#include "services/base/core/generator_inputs.h"
+
 namespace fulcrum::render {
 namespace {
 
@@ -31,6 +33,20 @@ std::string ForceBar(int tool, float force_N, float limit_N) {
 
 const char* NameOf(TubeFlow flow) {
   return flow == TubeFlow::kAspirates ? " SUCTION" : flow == TubeFlow::kIrrigates ? " IRRIGATION" : "";
+}
+
+const char* NameOf(CauteryMode mode) {
+  switch (mode) {
+    case CauteryMode::kCut:
+      return "CUT";
+    case CauteryMode::kBlend:
+      return "BLEND";
+    case CauteryMode::kCoag:
+      return "COAG";
+    case CauteryMode::kOff:
+      break;
+  }
+  return "";
 }
 
 std::string InCapitals(std::string_view name) {
@@ -137,13 +153,8 @@ std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
                        *force_N > state.force_limit_N && !state.assists[static_cast<std::size_t>(tool)]});
     }
   }
-  const char* mode = (state.pedals & kPedalBlend)  ? "BLEND"
-                     : (state.pedals & kPedalCut)  ? "CUT"
-                     : (state.pedals & kPedalCoag) ? "COAG"
-                                                   : "";
-  if (*mode != '\0') {
-    texts.push_back(
-        {Corner::kBottomLeft, line, state.power_W > 0 ? std::string(mode) + Number(" %.0f W", state.power_W) : mode});
+  if (const std::string mode = NameOf(ModeOf(state.pedals)); !mode.empty()) {
+    texts.push_back({Corner::kBottomLeft, line, state.power_W > 0 ? mode + Number(" %.0f W", state.power_W) : mode});
   }
   line = 0;
   if (state.slit_m > 0) {

@@ -43,6 +43,18 @@ TEST(Hud, SaysWhatATubeDoesAndHow) {
   EXPECT_TRUE(Says(state, "TUBE: HOLD THE JAW: SUCTION"));
 }
 
+TEST(Hud, NamesTheModeThatTheGeneratorDeliversWithSeveralPedalsDown) {
+  HudState state;
+  state.power_W = 60;
+  const auto says = [&](std::uint8_t pedals, const std::string& text) {
+    state.pedals = pedals;
+    return std::ranges::any_of(HudTexts(state, true), [&](const OverlayText& line) { return line.text == text; });
+  };
+  EXPECT_TRUE(says(kPedalCut | kPedalBlend, "CUT 60 W"));
+  EXPECT_TRUE(says(kPedalCoag | kPedalBlend, "BLEND 60 W"));
+  EXPECT_TRUE(says(kPedalCoag, "COAG 60 W"));
+}
+
 TEST(Hud, TheBarIsFullAtTheHighestForceAllowedAndAWarningAbove) {
   HudState state;
   state.force_limit_N = 4;
