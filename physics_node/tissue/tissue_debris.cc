@@ -1,14 +1,8 @@
 // Debris: pieces of membrane without connection to an anchor.
 #include "physics_node/tissue/tissue_model.h"
+#include "services/base/core/slit_sheet.h"
 
 namespace fulcrum::physics {
-namespace {
-
-/// Most nodes of a piece of debris, about 2 cm^2 of the built-in sheet. It bounds the search for an anchor, and so the
-/// cost of an edit; larger pieces stay in the simulation.
-constexpr std::size_t kLargestDebris = 250;
-
-}  // namespace
 
 /// Ends of the live edges of a node; kNoIndex where there is none.
 std::array<Index, 6> TissueModel::Neighbours(Index node) const {
@@ -35,7 +29,8 @@ bool TissueModel::IsAnchor(Index node) const {
          node_bindings_.start[node] < node_bindings_.start[node + 1];
 }
 
-/// Searches an anchor among the nodes that are connected to each changed node; a piece without one becomes debris.
+/// Searches an anchor among the nodes that are connected to each changed node; a crumb without one becomes debris.
+/// Larger pieces stay in the simulation.
 void TissueModel::FindDebris(const std::vector<Index>& changed, ParticleStore* particles) {
   for (const Index start : changed) {
     if (!NodeAlive(start) || IsDebris(start)) {
@@ -50,7 +45,7 @@ void TissueModel::FindDebris(const std::vector<Index>& changed, ParticleStore* p
         if (next != kNoIndex && visited_[next] != search_) {
           visited_[next] = search_;
           piece_.push_back(next);
-          held = held || IsAnchor(next) || piece_.size() > kLargestDebris;
+          held = held || IsAnchor(next) || piece_.size() >= kCrumbNodes;
         }
       }
     }

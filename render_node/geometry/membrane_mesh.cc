@@ -8,12 +8,6 @@
 #include "services/base/core/sheets.h"
 
 namespace fulcrum::render {
-namespace {
-
-// Pieces with fewer nodes are crumbs: about 30 mm^2 of the built-in sheet.
-constexpr std::size_t kCrumbNodes = 40;
-
-}  // namespace
 
 MembraneMesh::MembraneMesh(const SceneView& scene)
     : scene_(scene), rows_(scene.membrane.rows), cols_(scene.membrane.cols) {
@@ -23,7 +17,7 @@ MembraneMesh::MembraneMesh(const SceneView& scene)
   absent_ = AbsentNodes(scene);
   anchored_.assign(nodes, 0);
   for (const Binding& binding : scene.bindings) {
-    if (!scene.sheets.empty()) anchored_[binding.membrane - scene.membrane.first] = 1;
+    anchored_[binding.membrane - scene.membrane.first] = 1;
   }
   BuildTriangles();
 }
@@ -39,8 +33,8 @@ bool MembraneMesh::SetTopology(const TopologyState& topology) {
   return true;
 }
 
-// Flood fill over live edges; a piece is a crumb if it is small and none of its nodes is fixed or, in a scene of
-// several sheets, bound: there bindings may be all that holds a sheet.
+// Flood fill over live edges; a piece is a crumb if it is small and none of its nodes is fixed or bound. What bindings
+// hold physics computes, tools touch and current heats.
 void MembraneMesh::FindGone() {
   const Index nodes = scene_.membrane.node_count();
   const Held held{*this};

@@ -24,6 +24,10 @@
 
 namespace fulcrum {
 
+/// Pieces of sheet with fewer nodes that are neither fixed nor bound are crumbs, about 30 mm^2 of the built-in sheet:
+/// physics freezes them and the picture does not show them. All that is shown can be touched.
+inline constexpr std::size_t kCrumbNodes = 40;
+
 /// Corners and edges of membrane triangle 2 * cell + half (numbering of CauteryContact and TopologyState).
 struct MembraneTriangle {
   Triangle nodes;

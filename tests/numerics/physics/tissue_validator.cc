@@ -5,11 +5,11 @@
 #include <sstream>
 #include <vector>
 
+#include "services/base/core/slit_sheet.h"
+
 namespace fulcrum::physics {
 namespace {
 
-/// As in tissue_debris.cc: larger pieces keep moving.
-constexpr std::size_t kLargestDebris = 250;
 /// Error of a direction between two points a micrometre apart, in float.
 constexpr float kUnitTolerance = 0.1f;
 
@@ -158,7 +158,7 @@ class Check {
           }
         }
       }
-      const bool debris = !anchored && piece.size() <= kLargestDebris;
+      const bool debris = !anchored && piece.size() < kCrumbNodes;
       for (const Index node : piece) {
         if (!model_.IsAbsent(node) && model_.IsDebris(node) != debris) {
           fault_ << "node " << node << " of a piece of " << piece.size() << (anchored ? " that hangs on" : " that is")

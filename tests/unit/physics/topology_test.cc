@@ -5,6 +5,7 @@
 
 #include "physics_node/tissue/tissue_model.h"
 #include "services/base/core/error.h"
+#include "services/base/core/slit_sheet.h"
 #include "services/scene/builder/build.h"
 #include "tests/support/whole_topology.h"
 #include "tests/unit/physics/sheet_scene.h"
@@ -151,6 +152,15 @@ TEST_F(Topology, APieceThatHangsOnNothingIsDebris) {
     EXPECT_EQ(particles_.InverseMass(particles_.Ref(node)), piece ? 0.0f : scene_.inverse_mass[node]);
   }
   EXPECT_FALSE(model_.TriangleAlive(2 * (5 * 16 + 6)));
+}
+
+TEST_F(Topology, APieceThatThePictureShowsStaysTissue) {
+  CutOut(2, 6, 3, 10, scene_, &state_);
+  static_assert(5 * 8 == kCrumbNodes);
+  (void)model_.Apply(state_, &particles_);
+  EXPECT_FALSE(model_.IsDebris(4 * 17 + 6));
+  EXPECT_GT(particles_.InverseMass(particles_.Ref(4 * 17 + 6)), 0.0f) << "tools touch it and take it along";
+  EXPECT_TRUE(model_.TriangleAlive(2 * (4 * 16 + 6)));
 }
 
 TEST_F(Topology, OneEdgeLeftHoldsAPiece) {

@@ -117,7 +117,7 @@ TEST_F(MembraneMeshTest, ADeadNodeIsNeverDrawnAndAWildOneDoesNoHarm) {
 }
 
 TEST_F(MembraneMeshTest, ACrumbIsNotDrawnButAFlapIs) {
-  // A square of nine nodes is separated by cutting every edge that leaves it.
+  // A square of nine nodes that nothing binds is separated by cutting every edge that leaves it.
   const auto inside = [](std::uint32_t row, std::uint32_t col) {
     return row >= 20 && row < 23 && col >= 8 && col < 11;
   };
@@ -131,14 +131,42 @@ TEST_F(MembraneMeshTest, ACrumbIsNotDrawnButAFlapIs) {
       }
     }
   }
-  ASSERT_TRUE(mesh_.SetTopology(topology_));
+  scene::SceneData data = data_;
+  std::erase_if(data.bindings, [&](const Binding& binding) {
+    const Index node = binding.membrane - view_.membrane.first;
+    return inside(node / view_.membrane.cols, node % view_.membrane.cols);
+  });
+  MembraneMesh mesh(data.View());
+  ASSERT_TRUE(mesh.SetTopology(topology_));
   for (std::uint32_t row = 20; row < 23; ++row) {
     for (std::uint32_t col = 8; col < 11; ++col) {
-      EXPECT_TRUE(mesh_.node_gone(Node(row, col)));
+      EXPECT_TRUE(mesh.node_gone(Node(row, col)));
     }
   }
-  EXPECT_FALSE(mesh_.node_gone(Node(19, 8)));
-  EXPECT_FALSE(mesh_.node_gone(Node(40, 12)));
+  EXPECT_FALSE(mesh.node_gone(Node(19, 8)));
+  EXPECT_FALSE(mesh.node_gone(Node(40, 12)));
+}
+
+TEST_F(MembraneMeshTest, AnIslandThatIsBoundIsDrawnAsPhysicsComputesIt) {
+  const auto inside = [](Index row, Index col) { return row >= 20 && row < 26 && col >= 8 && col < 14; };
+  constexpr std::uint32_t kSteps[3][2] = {{0, 1}, {1, 0}, {1, 1}};
+  for (Index row = 0; row + 1 < view_.membrane.rows; ++row) {
+    for (Index col = 0; col + 1 < view_.membrane.cols; ++col) {
+      for (std::size_t d = 0; d < 3; ++d) {
+        if (inside(row, col) != inside(row + kSteps[d][0], col + kSteps[d][1])) {
+          SetBit(topology_.dead_edges, 3 * std::size_t{Node(row, col)} + d);
+        }
+      }
+    }
+  }
+  ASSERT_TRUE(std::ranges::any_of(view_.bindings, [&](const Binding& b) {
+    const Index node = b.membrane - view_.membrane.first;
+    return inside(node / view_.membrane.cols, node % view_.membrane.cols);
+  }));
+  ASSERT_TRUE(mesh_.SetTopology(topology_));
+  for (Index row = 20; row < 26; ++row) {
+    for (Index col = 8; col < 14; ++col) EXPECT_FALSE(mesh_.node_gone(Node(row, col)));
+  }
 }
 
 TEST_F(MembraneMeshTest, RefusesTheTopologyOfAnotherGrid) {
