@@ -40,6 +40,16 @@ float Grasp::HoldOf(const HeldParticle& held, const ToolDescription& tool) const
   return std::clamp(1.0f - (1.0f - kLeastHold) * (out - kFirmShare) / (1.0f - kFirmShare), kLeastHold, 1.0f);
 }
 
+std::vector<Index> Grasp::InJaws(const ToolDescription& tool, const ToolPose& pose, float reach,
+                                 const TissueModel& model, const ParticleStore& particles) {
+  std::vector<Index> tissue;
+  for (Index p = 0; p < particles.particle_count(); ++p) {
+    const Vec3f p_T = pose.ToTool(particles.At(particles.Ref(p)));
+    if (DistanceToJaws(p_T, tool, pose.jaw_rad) < reach && model.BaseInverseMass(p) > 0.0f) tissue.push_back(p);
+  }
+  return tissue;
+}
+
 void Grasp::Update(const ToolDescription& tool, const ToolPose& pose, const TissueModel& model,
                    ParticleStore* particles) {
   if (tool.kind != ToolKind::kGrasper && tool.kind != ToolKind::kClipApplier) {

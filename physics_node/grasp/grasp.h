@@ -33,6 +33,9 @@ class Grasp {
   /// fold, and of a grasper the membrane within grasp_radius of their middle line; if there are none, the organ within
   /// grasp_radius.
   void Update(const ToolDescription& tool, const ToolPose& pose, const TissueModel& model, ParticleStore* particles);
+  /// Living tissue nearer than `reach` to the surface that the jaws span [m], also where a tool holds it.
+  [[nodiscard]] static std::vector<Index> InJaws(const ToolDescription& tool, const ToolPose& pose, float reach,
+                                                 const TissueModel& model, const ParticleStore& particles);
   /// Moves the held particles with the tool.
   void Move(const ToolPose& pose, ParticleStore* particles) const;
   /// Largest traction without slip at an opening angle [N]: grip_force_N when closed, falling linearly to 0 at

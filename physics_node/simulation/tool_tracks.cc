@@ -7,6 +7,7 @@
 //   p, q, p_in, q_in  last pose and input, frame W        v, omega  kMaxToolSpeed, kMaxToolTurn        h  step [s]
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "physics_node/simulation/tissue_simulation.h"
 
@@ -35,6 +36,24 @@ ToolPose Approach(const ToolPose& from, const ToolPose& to, float step, float tu
   return pose;
 }
 
+/// Reach of a clip to both sides of a line of nodes, in cells: the next lines, also of a sheet that is stretched by a
+/// fifth.
+constexpr float kBesideCells = 1.2f;
+
+/// Longest side of the cells at nodes of one row or one column of a sheet [m]; 0 where the tissue is not that.
+float CellOfLine(std::span<const Index> tissue, const TissueScene& scene) {
+  const Index first = scene.membrane.first, cols = scene.membrane.cols;
+  bool row = !tissue.empty(), col = row;
+  float cell = 0;
+  for (const Index p : tissue) {
+    if (p < first) return 0;
+    row = row && (p - first) / cols == (tissue[0] - first) / cols;
+    col = col && (p - first) % cols == (tissue[0] - first) % cols;
+    for (std::size_t d = 0; d < 2; ++d) cell = std::max(cell, scene.membrane_rest_length[3 * (p - first) + d]);
+  }
+  return row || col ? cell : 0;
+}
+
 }  // namespace
 
 bool TissueSimulation::ToolTrack::moved() const {
@@ -61,19 +80,32 @@ void TissueSimulation::UpdateGrasps() {
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     const ToolTrack& track = tracks_[i];
     if (track.present) {
-      const bool held = grasps_[i].holding();
+      const bool was_open = grasps_[i].state() == Grasp::State::kOpen;
       grasps_[i].Update(scene_.tools[i], track.now, model_, &particles_);
-      if (scene_.tools[i].kind == ToolKind::kClipApplier && !held && grasps_[i].holding()) ApplyClip(i);
+      const bool closes = was_open && grasps_[i].state() != Grasp::State::kOpen;
+      if (scene_.tools[i].kind == ToolKind::kClipApplier && closes) ApplyClip(i);
     } else if (grasps_[i].holding()) {
       grasps_[i].Release(model_, &particles_);
     }
   }
 }
 
+/// What other tools hold is clipped as well: the vessel is closed beside the grasper that steadies it.
 void TissueSimulation::ApplyClip(std::size_t tool) {
-  std::vector<Index> held;
-  for (const HeldParticle& particle : grasps_[tool].held()) held.push_back(particle.particle);
-  (void)clips_.Apply(static_cast<std::uint8_t>(tool), scene_.tools[tool], tracks_[tool].now, held, particles_);
+  const ToolDescription& applier = scene_.tools[tool];
+  const ToolPose& pose = tracks_[tool].now;
+  const float jaw = std::min(applier.tip_radius_m, scene_.physics.grasp_radius_m);
+  std::vector<Index> tissue = Grasp::InJaws(applier, pose, jaw, model_, particles_);
+  // Jaws that lie along a row or column of a sheet whose cells are wider than they are hold that line alone. They have
+  // pressed together what lies beside it too.
+  if (const float cell = CellOfLine(tissue, scene_); cell > 0.0f) {
+    for (const Index p : Grasp::InJaws(applier, pose, std::max(jaw, kBesideCells * cell), model_, particles_)) {
+      const bool is_new = p >= scene_.membrane.first && std::ranges::find(tissue, p) == tissue.end();
+      if (is_new) tissue.push_back(p);
+    }
+  }
+  if (tissue.empty()) return;
+  (void)clips_.Apply(static_cast<std::uint8_t>(tool), applier, pose, tissue, particles_);
 }
 
 void TissueSimulation::FindContacts(bool tissue_moved, float tissue_step) {

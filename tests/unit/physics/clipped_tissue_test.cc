@@ -7,6 +7,7 @@
 #include "physics_node/simulation/script_player.h"
 #include "tests/support/clipped_strips.h"
 #include "tests/support/whole_topology.h"
+#include "tests/unit/physics/sheet_scene.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -222,6 +223,55 @@ TEST(ClipApplier, ClosingOnNothingSpendsNoClip) {
   EXPECT_EQ(simulation.clips().count(), 0u);
   EXPECT_EQ(simulation.clips().refused(), 0u);
   EXPECT_TRUE(simulation.clips().possible());
+}
+
+/// Jaws in the plane of SheetScene along its columns, their middle at a place.
+ToolPose AlongColumns(const Vec3f& middle, const ToolDescription& tool) {
+  const Quatf q(Eigen::AngleAxisf(static_cast<float>(-M_PI / 2), Vec3f::UnitX()));
+  return {middle + q * Vec3f(0, 0, 0.5f * tool.tip_length_m), q, 0.0f};
+}
+
+constexpr std::uint32_t kGrid = 25;
+constexpr float kCell_m = 0.0011f;  // Wider than the jaws are to either side of their line: 1 mm.
+
+scene::SceneData SheetWithApplier() {
+  scene::SceneData data = SheetScene(kGrid, kGrid, kCell_m);
+  data.fixed.tools[1] = {ToolKind::kClipApplier, Vec3f(0, 0, 0.15f), 0.0025f, 0.3f, 0.001f, 0.008f};
+  return data;
+}
+
+TEST(ClipApplier, LeavesAClipHoweverTheJawsLieToTheMesh) {
+  const scene::SceneData data = SheetWithApplier();
+  const SceneView scene = data.View();
+  for (int i = 0; i < 10; ++i) {
+    TissueSimulation simulation(scene);
+    const Vec3f middle((12 + 0.1f * static_cast<float>(i)) * kCell_m, 12 * kCell_m, 0);
+    std::array<ToolInput, kMaxTools> tools{};
+    tools[1] = {true, AlongColumns(middle, scene.tools[1])};
+    simulation.Step(tools);
+    ASSERT_EQ(simulation.clips().count(), 1u) << i;
+    EXPECT_EQ(simulation.clips().refused(), 0u) << i;
+    EXPECT_GE(simulation.clips().Save().clips[0].tissue.size(), 12u) << i;
+  }
+}
+
+TEST(ClipApplier, ClipsAlsoWhatAGrasperHolds) {
+  const scene::SceneData data = SheetWithApplier();
+  const SceneView scene = data.View();
+  TissueSimulation simulation(scene);
+  const Vec3f middle(12.5f * kCell_m, 12 * kCell_m, 0);
+  std::array<ToolInput, kMaxTools> tools{};
+  tools[0] = {true, AlongColumns(middle + Vec3f(0.002f, 0, 0), scene.tools[0])};
+  tools[1] = {true, AlongColumns(middle, scene.tools[1])};
+  simulation.Step(tools);
+  ASSERT_EQ(simulation.clips().count(), 1u);
+  const std::vector<HeldParticle>& held = simulation.grasp(0).held();
+  const AppliedClip clip = simulation.clips().Save().clips[0];
+  const auto is_held = [&](const ClippedParticle& clipped) {
+    return std::ranges::any_of(held, [&](const HeldParticle& h) { return h.particle == clipped.particle; });
+  };
+  EXPECT_TRUE(std::ranges::all_of(clip.tissue, is_held)) << "the grasper is nearer than 4 mm to all of it";
+  EXPECT_TRUE(simulation.grasp(1).held().empty());
 }
 
 TEST(ClipApplier, AToolThatIsNoneLeavesNoClipAndNoTrace) {
