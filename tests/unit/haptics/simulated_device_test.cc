@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
+#include <vector>
 
 #include "services/base/core/operator_script.h"
 #include "tests/unit/haptics/rig.h"
@@ -91,6 +93,66 @@ TEST(SimulatedDevice, AToolWithoutKeysRests) {
   const Vec3d first = device.ReadPosition(TickAt(0));
   for (std::uint64_t i = 1; i < 100; ++i) EXPECT_EQ(device.ReadPosition(TickAt(i)), first);
   EXPECT_TRUE(first.allFinite());
+}
+
+TEST(SimulatedDevice, RestsHalfOfItsShaftInside) {
+  // The pivot is 0.2 m above the origin, the shaft 0.4 m long.
+  EXPECT_LT(Tip(RestingAttachPoint(BenchTrocar())).norm(), 1e-12);
+}
+
+TEST(SimulatedDevice, ALateClockIsTheSameSessionAndAnotherSessionIsTakenUpAtRest) {
+  // The script moves at 42 mm/s, so that the hand is not exactly on it.
+  const auto error = [](double jump_s) {
+    SimulatedDevice device({}, BenchTrocar(), kScript, 0);
+    for (std::uint64_t i = 0; i < 1500; ++i) (void)device.ReadPosition(TickAt(i));
+    Tick tick = TickAt(1500);
+    tick.session_time_s += jump_s;
+    const Vec3d tip = Tip(device.ReadPosition(tick));
+    return (tip - EvaluateScript(kScript, 0, tick.session_time_s).p_W.cast<double>()).norm();
+  };
+  EXPECT_GT(error(0.048), 1e-5);
+  EXPECT_GT(error(-0.048), 1e-5);
+  EXPECT_LT(error(0.052), 1e-7);
+  EXPECT_LT(error(-0.052), 1e-7);
+}
+
+/// The tip's height in each millisecond, of a closed grasper with a wanted traction of 0.6 N, while the tissue pulls
+/// down with a constant force. The jaws open at 4 s.
+std::vector<double> HeightsUnder(double force_N) {
+  const std::array<ScriptKey, 3> script{{{0.0f, 0, Vec3f(0, 0, 0.05f), 0, 0, 0},
+                                         {4.0f, 0, Vec3f(0, 0, 0.05f), 0, 0, 0},
+                                         {4.001f, 0, Vec3f(0, 0, 0.05f), 0.8f, 0, 0}}};
+  SimulatedDevice device({}, BenchTrocar(), script, 0);
+  device.set_traction(0.6);
+  std::vector<double> heights;
+  for (std::uint64_t i = 0; i < 5000; ++i) {
+    const TrocarPose pose = PoseFromAttachPoint(BenchTrocar(), device.ReadPosition(TickAt(i)));
+    heights.push_back(pose.p_WT.z());
+    device.WriteForce(ForceAtAttachPoint(pose, Vec3d(0, 0, -force_N)));
+  }
+  return heights;
+}
+
+TEST(SimulatedDevice, AnAssistantPullsAtFiftyMillimetresASecondForEachNewtonThatIsMissing) {
+  const auto moved = [](double force_N) {
+    const std::vector<double> z = HeightsUnder(force_N);
+    return z[2000] - z[1000];
+  };
+  EXPECT_NEAR(moved(0.5), 0.005, 2e-5);
+  EXPECT_NEAR(moved(0.55), 0.0025, 2e-5);
+  EXPECT_NEAR(moved(0.7), -0.005, 2e-5) << "gives way to a larger force";
+  EXPECT_NEAR(moved(0.1), 0.010, 2e-5) << "no faster than a careful hand";
+  EXPECT_NEAR(moved(2), -0.010, 2e-5);
+  EXPECT_NEAR(moved(0.022), 0.010, 2e-5);
+  EXPECT_NEAR(moved(0.018), 0, 1e-6) << "does not feel it";
+}
+
+TEST(SimulatedDevice, AnAssistantPullsByTwentyFiveMillimetresAtMostAndLetsGoWithTheTimeConstant) {
+  const HapticsParams hand;
+  const std::vector<double> z = HeightsUnder(0.1);
+  const double still = 0.05 - 0.1 / hand.hand_stiffness_N_m;
+  EXPECT_NEAR(z[3990] - still, 0.025, 2e-5);
+  EXPECT_NEAR((z[4501] - still) / (z[4201] - still), std::exp(-1.0), 0.01) << "0.3 s later";
 }
 
 // A grasper closes at 1 s on tissue of 40 N/m, which later gives way by 10 mm.
