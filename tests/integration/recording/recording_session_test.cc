@@ -147,9 +147,9 @@ TEST(RestartedRecorder, LeavesOneRecordingThatNamesTheBreak) {
 /// `fulcrum up` with a recording and, unlike Cart, its video.
 class FilmedSession {
  public:
-  FilmedSession()
+  explicit FilmedSession(const std::string& scene = "small")
       : up_("fulcrum",
-            {"up", "small", "--record", "--seconds", "2", "--domain", std::to_string(kCartDomain), "--out", folder_}) {}
+            {"up", scene, "--record", "--seconds", "2", "--domain", std::to_string(kCartDomain), "--out", folder_}) {}
   ~FilmedSession() {
     up_ = Program();
     fs::remove_all(folder_);
@@ -180,6 +180,17 @@ TEST(RecordedCart, TheReportContainsTheVideo) {
   EXPECT_GT(fs::file_size(session.video()), 10'000u);
   EXPECT_NE(session.report().find("data:video/mp4;base64,"), std::string::npos);
   EXPECT_NE(session.report().find("0:00 start"), std::string::npos) << "its chapters";
+}
+
+TEST(RecordedCart, TheVideoIsDrawnWithTheSceneOfTheSession) {
+  const fs::path scene = fs::temp_directory_path() / ("filmed-" + std::to_string(::getpid()) + ".fulcrum");
+  ASSERT_EQ(Program("scene_compiler", {FULCRUM_SOURCE_DIR "/deploy/scenes/small.yaml", "--out", scene}).End(0), 0);
+  FilmedSession session(scene);
+  ASSERT_TRUE(testing::WaitFor(60, [&] { return session.up().Said().find(" s · ") != std::string::npos; }))
+      << session.up().Said();
+  fs::remove(scene);  // As one that was compiled again, or left the cache.
+  session.ExpectEndsWell();
+  EXPECT_TRUE(fs::exists(session.video())) << session.up().Said();
 }
 
 TEST(RecordedCart, TheNextSessionNeedNotWaitForTheVideo) {
