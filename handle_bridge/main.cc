@@ -11,17 +11,18 @@
 
 namespace {
 
-fulcrum::ExitCode RunBridge(fulcrum::app::NodeApp& app) {
+using namespace fulcrum;  // NOLINT: a main is nothing but names of other modules
+
+ExitCode RunBridge(app::NodeApp& app) {
   using namespace fulcrum::handle_bridge;
-  using fulcrum::config::LinkKind;
-  const fulcrum::config::CartConfig cart = ForScene(app.cart(), app.scene());
+  using config::LinkKind;
+  const config::CartConfig cart = ForScene(app.cart(), app.scene());
   const bool operated = HasLinks(cart, LinkKind::kOperator);
   const ScriptedHands scripted(app.scene(), cart);
   OperatedHands hands(cart, app.scene());
-  fulcrum::OperatorChoice choice;
-  fulcrum::OperatorInput sample;
-  fulcrum::bus::Input<fulcrum::OperatorInput>* const inputs =
-      operated ? &app.MakeInput<fulcrum::OperatorInput>() : nullptr;
+  OperatorChoice choice;
+  OperatorInput sample;
+  bus::Input<OperatorInput>* const inputs = operated ? &app.MakeInput<OperatorInput>() : nullptr;
   // Called on the firmware's thread. Sends nothing until the session time is known: after a restart during a session
   // the script's first key would be a wrong angle.
   const auto input_at = [&](std::int64_t now_ns) -> std::optional<SimulatedInput> {
@@ -30,25 +31,29 @@ fulcrum::ExitCode RunBridge(fulcrum::app::NodeApp& app) {
     if (time_s < 0) return std::nullopt;
     return hands.Replace(scripted.At(time_s), choice.At(now_ns));
   };
+  const auto rests_until = [&](std::int64_t now_ns) {
+    return now_ns + ScriptRest_ns(app.scene(), cart, app.SessionTime(now_ns));
+  };
+  runtime::Bell lines;
   const auto firmware = operated || HasLinks(cart, LinkKind::kSimulated)
-                            ? std::make_unique<SimulatedFirmware>(input_at, MakeSimulatedUnits(cart))
+                            ? std::make_unique<SimulatedFirmware>(input_at, MakeSimulatedUnits(cart),
+                                                                  SimulatedFirmware::Rest{rests_until, &lines})
                             : nullptr;
   const CalibrationStore calibrations = CalibrationStore::Load(CalibrationFolder());
-  fulcrum::runtime::Log(fulcrum::runtime::LogLevel::kInfo, calibrations.Describe());
-  HandleBridgeNode node(cart, calibrations, MakeCartLinks(cart, firmware.get()),
-                        &app.MakeOutput<fulcrum::HandleState>(), fulcrum::runtime::MonotonicNs(),
-                        NeedsButtons(cart) ? &app.MakeInput<fulcrum::ToolState>() : nullptr);
+  runtime::Log(runtime::LogLevel::kInfo, calibrations.Describe());
+  HandleBridgeNode node(cart, calibrations, MakeCartLinks(cart, firmware.get()), &app.MakeOutput<HandleState>(),
+                        runtime::MonotonicNs(), NeedsButtons(cart) ? &app.MakeInput<ToolState>() : nullptr);
+  runtime::CyclicThreadSettings timing = app.timing();
+  timing.rests_until = [&node] { return node.RestsUntil(); };
+  timing.bell = &lines;
   return app.Run(
-      app.timing(), [&node](const fulcrum::Tick& tick) { node.Step(tick); },
-      [&node](fulcrum::Health* health) { node.FillHealth(health); });
+      timing, [&node](const Tick& tick) { node.Step(tick); }, [&node](Health* health) { node.FillHealth(health); });
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (fulcrum::handle_bridge::IsCalibrateCommand(argc, argv)) {
-    return fulcrum::handle_bridge::CalibrateMain(argc, argv);
-  }
+  if (handle_bridge::IsCalibrateCommand(argc, argv)) return handle_bridge::CalibrateMain(argc, argv);
   return fulcrum::app::NodeMain(argc, argv, fulcrum::NodeId::kHandleBridge,
                                 "Jaw angles and foot pedal from serial lines.\n"
                                 "`handle_bridge calibrate --help`: calibrates a handle.",

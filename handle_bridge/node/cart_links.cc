@@ -1,6 +1,7 @@
 #include "handle_bridge/node/cart_links.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <numbers>
@@ -10,6 +11,7 @@
 #include "handle_bridge/serial/serial_port.h"
 #include "services/base/config/operation.h"
 #include "services/base/core/operator_script.h"
+#include "services/base/core/script_rest.h"
 
 namespace fulcrum::handle_bridge {
 namespace {
@@ -112,6 +114,32 @@ SimulatedInput ScriptedHands::At(double session_time_s) const {
   }
   input.faults[kPedalLink] = FaultsAt(cart_.pedal.simulated, session_time_s);
   return input;
+}
+
+double ScriptRestsUntil(const SceneView& scene, const config::CartConfig& cart, double session_time_s) {
+  const auto has_faults = [](const config::SimulatedUnit& unit) {
+    return !unit.garbage_s.empty() || !unit.silent_s.empty() || !unit.wrong_baud_s.empty() ||
+           !unit.broken_wire_s.empty() || !unit.unplugged_s.empty();
+  };
+  double until_s = std::numeric_limits<double>::infinity();
+  for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
+    if (has_faults(cart.handles[tool].simulated)) return session_time_s;
+    until_s = std::min(until_s, fulcrum::ScriptRestsUntil(scene.script, tool, session_time_s));
+  }
+  return has_faults(cart.pedal.simulated) ? session_time_s : std::max(until_s, session_time_s);
+}
+
+bool IsScripted(const config::CartConfig& cart) {
+  const auto scripted = [](config::LinkKind kind) {
+    return kind == config::LinkKind::kNone || kind == config::LinkKind::kSimulated;
+  };
+  return scripted(cart.pedal.kind) &&
+         std::ranges::all_of(cart.handles, [&](const config::HandleConfig& handle) { return scripted(handle.kind); });
+}
+
+std::int64_t ScriptRest_ns(const SceneView& scene, const config::CartConfig& cart, double session_time_s) {
+  if (session_time_s < 0 || !IsScripted(cart)) return 0;
+  return std::llround(1e9 * std::min(ScriptRestsUntil(scene, cart, session_time_s) - session_time_s, 1.0));
 }
 
 OperatedHands::OperatedHands(const config::CartConfig& cart, const SceneView& scene) : cart_(cart) {

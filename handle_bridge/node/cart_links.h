@@ -42,6 +42,17 @@ class ScriptedHands {
   std::array<double, kMaxTools> stays_s_{};
 };
 
+/// Session time until which the scripted hands stay as they are [s]: infinite after the last change, `session_time_s`
+/// while something changes or where the cart schedules faults.
+[[nodiscard]] double ScriptRestsUntil(const SceneView& scene, const config::CartConfig& cart, double session_time_s);
+
+/// Only the script moves jaws and pedals: a real line can bring a change at any time, and so can an operator.
+[[nodiscard]] bool IsScripted(const config::CartConfig& cart);
+
+/// Time for which the scripted hands stay as they are, at most a second [ns]; 0 before the session, and
+/// unless all is scripted.
+[[nodiscard]] std::int64_t ScriptRest_ns(const SceneView& scene, const config::CartConfig& cart, double session_time_s);
+
 /// Handles and pedal of kind `operator`: simulated firmware whose jaws and pedals are an operator's instead of the
 /// script's.
 class OperatedHands {

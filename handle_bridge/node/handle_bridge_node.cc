@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "handle_bridge/node/cart_links.h"
+
 namespace fulcrum::handle_bridge {
 namespace {
 
@@ -17,6 +19,8 @@ constexpr std::size_t kReadBytes = 512;
 /// Longest time between two samples while nothing changes and no pedal is down: short for 0.2 s after a change of more
 /// than kRestingAngle_rad, so that a lost sample is repeated, then long.
 constexpr std::int64_t kShortSilence_ns = 9'000'000, kLongSilence_ns = 39'000'000, kRestsAfter_ns = 200'000'000;
+/// Longest time between two steps at rest; lines that arrive end it.
+constexpr std::int64_t kRest_ns = 40'000'000;
 /// Changes of an angle since the newest sample that are published at once. A count of the converter is 0.03 rad.
 constexpr float kSameAngle_rad = 0.005f;
 /// Smaller changes since the last one, up to 0.4 counts, are noise of a jaw that rests between two counts.
@@ -59,7 +63,8 @@ HandleBridgeNode::HandleBridgeNode(const config::CartConfig& cart, CalibrationSt
       links_(std::move(links)),
       buttons_(cart, tools),
       output_(output),
-      stamper_(epoch_ns) {
+      stamper_(epoch_ns),
+      scripted_(IsScripted(cart)) {
   for (std::size_t tool = 0; tool < jaws_.size(); ++tool) {
     if (links_.handles[tool]) {
       jaws_[tool].emplace(MakeJawChannelSettings(handles_[tool], nullptr));
@@ -86,6 +91,12 @@ void HandleBridgeNode::Step(const Tick& tick) {
   state_.pedals = ReadPedals(dt_s);
   Publish(tick);
   published_.Store(snapshot_);
+  stepped_ns_ = tick.stamp_ns;
+}
+
+std::int64_t HandleBridgeNode::RestsUntil() const {
+  const bool rests = scripted_ && stepped_ns_ - changed_ns_ >= kRestsAfter_ns && state_.pedals == kPedalNone;
+  return rests ? stepped_ns_ + kRest_ns : stepped_ns_;
 }
 
 /// A pedal that is down is repeated each period: whether the current flows must not wait.

@@ -45,6 +45,9 @@ class HandleBridgeNode {
 
   /// One period: reads the links, estimates the jaw angles, publishes HandleState.
   void Step(const Tick& tick);
+  /// After a Step: time until which the next one can wait for lines [CLOCK_MONOTONIC, ns]: later than that step where
+  /// only the script moves the handles, while no jaw moves and no pedal is down. Same thread.
+  [[nodiscard]] std::int64_t RestsUntil() const;
   /// May be called from any thread.
   void FillHealth(Health* health) const;
 
@@ -86,6 +89,8 @@ class HandleBridgeNode {
   HandleState sent_;             ///< The newest published one.
   HandleState rest_;             ///< As it was at the last change, however slow: since then it rests.
   std::int64_t changed_ns_ = 0;  ///< When that was.
+  std::int64_t stepped_ns_ = 0;
+  const bool scripted_;  ///< All lines come from simulated units that only the script moves.
   Snapshot snapshot_;
   runtime::SeqLock<Snapshot> published_;
 };

@@ -16,16 +16,21 @@ constexpr auto kPedalPeriods = static_cast<std::uint64_t>(kPedalPeriod_s * kLine
 /// Limit of the lines that are sent after a delay of this thread [lines]: a quarter of a second. Shorter delays lose no
 /// line.
 constexpr std::uint64_t kMaxCatchUp = 100;
+/// Longest time between two bursts of lines at rest: as many lines as may be late before they count as lost.
+constexpr std::int64_t kBurst_ns = 8 * kPeriod_ns;
 
 }  // namespace
 
-SimulatedFirmware::SimulatedFirmware(InputAt input, const std::array<SimulatedUnit, kLinks>& units)
+SimulatedFirmware::SimulatedFirmware(InputAt input, const std::array<SimulatedUnit, kLinks>& units, Rest rest)
     : input_(std::move(input)),
+      rest_(std::move(rest)),
       units_(units),
       jaws_{JawFirmware(units[0].jaw, 1), JawFirmware(units[1].jaw, 2), JawFirmware(units[2].jaw, 3),
             JawFirmware(units[3].jaw, 4)},
       links_{Link(11), Link(12), Link(14), Link(15), Link(13)},
-      thread_({.name = "firmware", .period_ns = kPeriod_ns}, [this](const Tick& tick) { Step(tick); }) {
+      thread_(
+          {.name = "firmware", .period_ns = kPeriod_ns, .rests_until = [this] { return RestsUntil(); }, .bell = &bell_},
+          [this](const Tick& tick) { Step(tick); }) {
   thread_.Start();
 }
 
@@ -55,6 +60,7 @@ void SimulatedFirmware::Step(const Tick& tick) {
   const std::lock_guard lock(mutex_);
   const std::uint64_t owed = std::min(tick.index - next_index_ + 1, kMaxCatchUp);
   next_index_ = tick.index + 1;
+  stepped_ns_ = tick.stamp_ns;
   for (std::uint64_t i = owed; i-- > 0;) {
     const std::optional<SimulatedInput> input = input_(tick.stamp_ns - static_cast<std::int64_t>(i) * kPeriod_ns);
     if (!input) {
@@ -68,6 +74,11 @@ void SimulatedFirmware::Step(const Tick& tick) {
     }
     SendPedals(input->pedals, input->faults[kPedalLink]);
   }
+  if (rest_.sent != nullptr) rest_.sent->Ring();
+}
+
+std::int64_t SimulatedFirmware::RestsUntil() const {
+  return rest_.until ? std::min(rest_.until(stepped_ns_), stepped_ns_ + kBurst_ns) : stepped_ns_;
 }
 
 void SimulatedFirmware::Plug(Link* link, bool plugged) {

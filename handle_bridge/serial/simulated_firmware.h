@@ -53,8 +53,17 @@ class SimulatedFirmware {
   /// Input at a CLOCK_MONOTONIC time [ns]; no value: not known yet, so nothing is sent.
   using InputAt = std::function<std::optional<SimulatedInput>(std::int64_t)>;
 
-  /// @param input called 400 times a second on the firmware's thread.
-  explicit SimulatedFirmware(InputAt input, const std::array<SimulatedUnit, kLinks>& units = DefaultUnits());
+  /// For units that nobody touches: their lines are sent in bursts, as an adapter with a buffer delivers them.
+  struct Rest {
+    /// Time until which the input stays as it is at this one [CLOCK_MONOTONIC, ns]; null: unknown.
+    std::function<std::int64_t(std::int64_t)> until;
+    runtime::Bell* sent = nullptr;  ///< Rung when lines have been sent; null: none. Outlives the firmware.
+  };
+
+  /// @param input called for each 1/400 s on the firmware's thread.
+  explicit SimulatedFirmware(InputAt input, const std::array<SimulatedUnit, kLinks>& units = DefaultUnits())
+      : SimulatedFirmware(std::move(input), units, Rest()) {}
+  SimulatedFirmware(InputAt input, const std::array<SimulatedUnit, kLinks>& units, Rest rest);
 
   /// Plain lines, the paper's potentiometers.
   static std::array<SimulatedUnit, kLinks> DefaultUnits();
@@ -72,21 +81,25 @@ class SimulatedFirmware {
     std::uint8_t sequence = 0;
   };
   void Step(const Tick& tick);
+  [[nodiscard]] std::int64_t RestsUntil() const;
   void Plug(Link* link, bool plugged);
   void SendJaw(std::size_t tool, double jaw_deg, const LinkFaults& faults);
   void SendPedals(std::uint8_t pedals, const LinkFaults& faults);
   void Transmit(Link* link, std::string_view bytes, const LinkFaults& faults);
 
   InputAt input_;
+  Rest rest_;
   std::array<SimulatedUnit, kLinks> units_;
   std::array<JawFirmware, kMaxTools> jaws_;
   std::mutex mutex_;
   std::array<Link, kLinks> links_;  // Guarded by mutex_.
   std::uint64_t next_index_ = 0;
+  std::int64_t stepped_ns_ = 0;
   std::uint8_t sent_pedals_ = kPedalNone;
   std::uint64_t pedal_index_ = 0;
   std::uint64_t floating_ = 1;    // State of the random generator for a broken wire.
   std::string bytes_;             // Scratch of Transmit.
+  runtime::Bell bell_;            // Nothing rings it: the end of a rest is known at its begin.
   runtime::CyclicThread thread_;  // Last member: stopped before the others are destroyed.
 };
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <functional>
@@ -127,6 +128,48 @@ TEST(HandlePty, FollowsTheFirmwareThroughNoise) {
   EXPECT_NEAR(chain.state.handles[1].jaw_angle_rad * kDegPerRad, 30, 1.5);
   EXPECT_EQ(chain.metric("bad_lines"), 0);
   EXPECT_GT(chain.metric("lines"), 500);
+}
+
+TEST(HandlePty, LinesThatNobodyChangesComeInBurstsAndAreAllTaken) {
+  const std::int64_t pressed_ns = runtime::MonotonicNs() + 2'500'000'000;
+  runtime::Bell lines;
+  const auto input = [&](std::int64_t now_ns) {
+    return SimulatedInput{{20, 30}, now_ns >= pressed_ns ? std::uint8_t{kPedalCut} : std::uint8_t{kPedalNone}, {}};
+  };
+  const auto until = [&](std::int64_t now_ns) { return now_ns < pressed_ns ? pressed_ns : now_ns + 1'000'000'000; };
+  SimulatedFirmware firmware(input, SimulatedFirmware::DefaultUnits(), {until, &lines});
+  bus::InProcessTopic<HandleState> topic;
+  const auto published = topic.MakeInput();
+  const auto output = topic.MakeOutput();
+  const config::CartConfig cart;
+  HandleBridgeNode node(cart, {}, MakeCartLinks(cart, &firmware), output.get(), runtime::MonotonicNs());
+  std::atomic<std::uint64_t> steps{0};
+  runtime::CyclicThread thread(
+      {.name = "handle", .period_ns = 2'500'000, .rests_until = [&] { return node.RestsUntil(); }, .bell = &lines},
+      [&](const Tick& tick) {
+        node.Step(tick);
+        ++steps;
+      });
+  thread.Start();
+  HandleState state;
+  for (int i = 0; i < 10'000 && state.pedals != kPedalCut; ++i) {
+    (void)published->TakeLatest(&state);
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  thread.Stop();
+  EXPECT_EQ(state.pedals, kPedalCut);
+  EXPECT_GE(state.stamp.stamp_ns, pressed_ns);
+  EXPECT_GT(state.handles[0].quality, 0.99f);
+  EXPECT_NEAR(state.handles[0].jaw_angle_rad * kDegPerRad, 20, 1.5);
+  EXPECT_LT(steps, thread.stats().ticks / 2);
+  Health health;
+  node.FillHealth(&health);
+  EXPECT_EQ(health.last_error, "");
+  for (const Metric& metric : health.metrics) {
+    // Two handles with a line a period; the terminal opens some periods after the first.
+    if (metric.name == "lines") EXPECT_GT(metric.value, 1.6 * static_cast<double>(thread.stats().ticks));
+    if (metric.name == "bad_lines" || metric.name == "lost_frames") EXPECT_EQ(metric.value, 0);
+  }
 }
 
 TEST(HandlePty, PedalsArriveAndAreReleased) {

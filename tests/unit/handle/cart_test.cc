@@ -83,7 +83,7 @@ TEST(ScriptedHands, AnAssistantBesideAPersonHoldsOn) {
   EXPECT_NEAR(ScriptedHands(scene, cart).At(9).jaw_deg[0], 0.1 * kDegPerRad, 1e-3);
 }
 
-TEST(FollowScript, AnAssistantDoesNotLetGoByTheClockBesideAPerson) {
+TEST(ScriptedHands, AnAssistantDoesNotLetGoByTheClockBesideAPerson) {
   const std::array keys = {ScriptKey{1, 2, Vec3f::Zero(), 0.8f, 0, 0}, ScriptKey{2, 2, Vec3f::Zero(), 0.0f, 0, 0},
                            ScriptKey{10, 2, Vec3f::Zero(), 0.0f, 0, 0}, ScriptKey{11, 2, Vec3f::Zero(), 0.8f, 0, 0}};
   SceneView scene;
@@ -92,10 +92,40 @@ TEST(FollowScript, AnAssistantDoesNotLetGoByTheClockBesideAPerson) {
   scene.tools[2].kind = ToolKind::kGrasper;
   scene.tools[2].traction_N = 2;
   config::CartConfig cart;
-  EXPECT_NEAR(FollowScript(scene, cart, 12).jaw_deg[2], 0.8 * kDegPerRad, 1e-3) << "the whole script";
+  EXPECT_NEAR(ScriptedHands(scene, cart).At(12).jaw_deg[2], 0.8 * kDegPerRad, 1e-3) << "the whole script";
   for (const config::DeviceKind kind : {config::DeviceKind::kTouch, config::DeviceKind::kOperator}) {
     cart.devices[0].kind = kind;
-    EXPECT_NEAR(FollowScript(scene, cart, 12).jaw_deg[2], 0, 1e-3);
+    EXPECT_NEAR(ScriptedHands(scene, cart).At(12).jaw_deg[2], 0, 1e-3);
+  }
+}
+
+TEST(ScriptRestsUntil, IsTheBeginOfTheNextChangeOfAnyJawOrPedal) {
+  const std::array keys = {ScriptKey{1, 0, Vec3f::Zero(), 0.8f, 0, 0}, ScriptKey{3, 0, Vec3f::Zero(), 0.8f, 0, 0},
+                           ScriptKey{5, 0, Vec3f::Zero(), 0.2f, 0, 0}, ScriptKey{0, 1, Vec3f::Zero(), 0.0f, 0, 0},
+                           ScriptKey{2, 1, Vec3f::Zero(), 0.0f, kPedalCut, 35}};
+  SceneView scene;
+  scene.script = keys;
+  config::CartConfig cart;
+  EXPECT_EQ(ScriptRestsUntil(scene, cart, 0.5), 2);
+  EXPECT_EQ(ScriptRestsUntil(scene, cart, 2.5), 3);
+  EXPECT_EQ(ScriptRestsUntil(scene, cart, 4), 4) << "the jaw moves";
+  EXPECT_TRUE(std::isinf(ScriptRestsUntil(scene, cart, 5.5)));
+  cart.handles[0].simulated.silent_s = {20, 21};
+  EXPECT_EQ(ScriptRestsUntil(scene, cart, 5.5), 5.5) << "faults begin at any time";
+}
+
+TEST(IsScripted, NeitherWithARealLineNorWithAnOperator) {
+  config::CartConfig cart;
+  cart.handles[0].kind = cart.pedal.kind = config::LinkKind::kSimulated;
+  EXPECT_TRUE(IsScripted(cart));
+  for (const config::LinkKind kind :
+       {config::LinkKind::kSerial, config::LinkKind::kOperator, config::LinkKind::kButtons}) {
+    config::CartConfig other = cart;
+    other.handles[1].kind = kind;
+    EXPECT_FALSE(IsScripted(other));
+    other = cart;
+    other.pedal.kind = kind;
+    EXPECT_FALSE(IsScripted(other));
   }
 }
 
