@@ -22,9 +22,10 @@
 namespace fulcrum::mutation {
 
 inline constexpr int kMostFaults = 1 << 16;
-inline constexpr int kRecord =
-    -2;  ///< FULCRUM_FAULT=-2: no fault; appends the number of each switch that is reached to FULCRUM_FAULT_FILE.
+/// FULCRUM_FAULT=-2: no fault; the number of each switch that is reached is appended to the file FULCRUM_FAULT_FILE.
+inline constexpr int kRecord = -2;
 
+/// The fault that is on; -1: none.
 inline const int kFault = std::getenv("FULCRUM_FAULT") != nullptr ? std::atoi(std::getenv("FULCRUM_FAULT")) : -1;
 
 inline void Record(int fault) noexcept {
