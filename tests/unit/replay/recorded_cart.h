@@ -168,11 +168,12 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
     std::unique_ptr<bus::Output<TickManifest>> manifests;
     std::unique_ptr<haptics::HapticsNode> node;
   };
+  std::array<bool, kMaxTools> simulated{true, true};
+  for (std::size_t k = 2; k < kMaxTools; ++k) simulated[k] = scene.tools[k].kind != ToolKind::kNone;
   const auto start_haptics = [&](std::int64_t epoch) {
     HapticsProcess h{models.MakeInput(), operators.MakeInput(), tools.MakeOutput(), manifests.MakeOutput(), nullptr};
     h.node = std::make_unique<haptics::HapticsNode>(
-        scene, std::array<bool, kMaxTools>{true, true},
-        haptics::HapticsNode::Ports{*h.models, *h.operators, *h.tools, *h.manifests}, epoch);
+        scene, simulated, haptics::HapticsNode::Ports{*h.models, *h.operators, *h.tools, *h.manifests}, epoch);
     return h;
   };
   std::optional<PhysicsProcess> physics = start_physics(kStart - 5);
