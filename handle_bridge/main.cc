@@ -15,9 +15,8 @@ using namespace fulcrum;  // NOLINT: a main is nothing but names of other module
 
 ExitCode RunBridge(app::NodeApp& app) {
   using namespace fulcrum::handle_bridge;
-  using config::LinkKind;
   const config::CartConfig cart = ForScene(app.cart(), app.scene());
-  const bool operated = HasLinks(cart, LinkKind::kOperator);
+  const bool operated = HasLinks(cart, config::LinkKind::kOperator);
   const ScriptedHands scripted(app.scene(), cart);
   OperatedHands hands(cart, app.scene());
   OperatorChoice choice;
@@ -35,7 +34,7 @@ ExitCode RunBridge(app::NodeApp& app) {
     return now_ns + ScriptRest_ns(app.scene(), cart, app.SessionTime(now_ns));
   };
   runtime::Bell lines;
-  const auto firmware = operated || HasLinks(cart, LinkKind::kSimulated)
+  const auto firmware = operated || HasLinks(cart, config::LinkKind::kSimulated)
                             ? std::make_unique<SimulatedFirmware>(input_at, MakeSimulatedUnits(cart),
                                                                   SimulatedFirmware::Rest{rests_until, &lines})
                             : nullptr;

@@ -21,14 +21,11 @@ ExitCode RunRender(app::NodeApp& app) {
   if (spare) app::BecomeSpare(NodeId::kRender);
   const bool hands = app.options().TakeFlag("--hands");
   const bool window = app.options().TakeFlag("--window") || hands;
-  // Half of what a recording leaves: the other half is for report and score at the end.
-  const auto keep_free_B = static_cast<std::uint64_t>(0.5e6 * app.cart().recorder.keep_free_MB);
   const render::RenderSettings settings{
-      .window = window,
-      .quality = render::QualityFromName(app.options().TakeValue("--quality", "auto")),
-      .frames = app.options().session / "frames",
-      .inputs = app.cart().inputs,
-      .keep_free_B = keep_free_B};
+      window, render::QualityFromName(app.options().TakeValue("--quality", "auto")), app.options().session / "frames",
+      app.cart().inputs,
+      // Half of what a recording leaves: the other half is for report and score at the end.
+      static_cast<std::uint64_t>(0.5e6 * app.cart().recorder.keep_free_MB)};
   auto stage = render::MakeStage(app.scene(), settings.window, spare);
   if (spare && !app::WaitUntilNeeded(NodeId::kRender)) return ExitCode::kDone;
   // Collected before the ports start the threads of the bus: those that draw, this one and the rasteriser's.

@@ -70,19 +70,6 @@ TEST(ScriptedHands, GiveTheFirstKeyBeforeTheSessionAndThePedalsOfAllTools) {
   EXPECT_NEAR(hands.At(99).jaw_deg[0], 0.2 * kDegPerRad, 1e-3);
 }
 
-TEST(ScriptedHands, AnAssistantBesideAPersonHoldsOn) {
-  const std::array keys = {ScriptKey{1, 0, Vec3f::Zero(), 0.8f, 0, 0}, ScriptKey{3, 0, Vec3f::Zero(), 0.1f, 0, 0},
-                           ScriptKey{5, 0, Vec3f::Zero(), 0.8f, 0, 0}};
-  SceneView scene;
-  scene.script = keys;
-  scene.tools[0].kind = ToolKind::kGrasper;
-  scene.tools[0].traction_N = 1;
-  config::CartConfig cart;
-  EXPECT_NEAR(ScriptedHands(scene, cart).At(9).jaw_deg[0], 0.8 * kDegPerRad, 1e-3);
-  cart.handles[0].kind = config::LinkKind::kOperator;
-  EXPECT_NEAR(ScriptedHands(scene, cart).At(9).jaw_deg[0], 0.1 * kDegPerRad, 1e-3);
-}
-
 TEST(ScriptedHands, AnAssistantDoesNotLetGoByTheClockBesideAPerson) {
   const std::array keys = {ScriptKey{1, 2, Vec3f::Zero(), 0.8f, 0, 0}, ScriptKey{2, 2, Vec3f::Zero(), 0.0f, 0, 0},
                            ScriptKey{10, 2, Vec3f::Zero(), 0.0f, 0, 0}, ScriptKey{11, 2, Vec3f::Zero(), 0.8f, 0, 0}};
