@@ -131,7 +131,7 @@ TEST_F(ConsoleTest, ASessionFromStartToReport) {
 
   std::string name;
   EXPECT_TRUE(
-      WaitFor(30, [&] { return !(name = Between(console.Get("/api/state").body, "\"picture\":\"", "\"")).empty(); }));
+      WaitFor(120, [&] { return !(name = Between(console.Get("/api/state").body, "\"picture\":\"", "\"")).empty(); }));
   const HttpReply picture = console.Get("/api/picture?name=" + name);
   EXPECT_EQ(picture.head.at("content-type"), "image/png");
   EXPECT_TRUE(picture.body.starts_with("\x89PNG\r\n"));
@@ -139,7 +139,7 @@ TEST_F(ConsoleTest, ASessionFromStartToReport) {
   EXPECT_NE(events.Receive(20, "\"points\":[[").find("data: {"), std::string::npos);
 
   EXPECT_TRUE(Obeys(console, "/api/restart", "node=thermal_node")) << console.Get("/api/state").body;
-  EXPECT_TRUE(WaitFor(30, [&] { return Says(console, {"\"restarts\":1"}); })) << console.Get("/api/state").body;
+  EXPECT_TRUE(WaitFor(120, [&] { return Says(console, {"\"restarts\":1"}); })) << console.Get("/api/state").body;
   EXPECT_TRUE(Obeys(console, "/api/dump", "")) << console.Get("/api/state").body;
   EXPECT_EQ(console.Post("/api/calibrate", "what=handle&tool=0").status, 409);
 
@@ -186,8 +186,8 @@ TEST_F(ConsoleTest, ASessionOutlivesItsConsoleAndIsFoundAgain) {
     console.program().End(SIGKILL);
   }
   ConsoleProgram again(kDomain, out(), Token());
-  EXPECT_TRUE(WaitFor(30, [&] { return Says(again, {"\"phase\":\"running\"", "\"own\":false"}); }));
-  EXPECT_TRUE(WaitFor(30, [&] { return Says(again, {"\"picture\":\"frame_"}); }));
+  EXPECT_TRUE(WaitFor(120, [&] { return Says(again, {"\"phase\":\"running\"", "\"own\":false"}); }));
+  EXPECT_TRUE(WaitFor(120, [&] { return Says(again, {"\"picture\":\"frame_"}); }));
   EXPECT_EQ(again.Post("/api/stop").status, 200);
   EXPECT_TRUE(WaitFor(60, [&] { return Says(again, {"\"phase\":\"idle\"", "\"has_report\":true"}); }));
 }
@@ -232,14 +232,14 @@ TEST_F(ConsoleTest, ACalibrationIsLedStepByStep) {
   EXPECT_EQ(console.Post("/api/calibrate", "what=trocar&tool=0").status, 409)
       << "nothing to measure on a simulated cart";
   EXPECT_EQ(console.Post("/api/calibrate", "what=handle&tool=0").status, 200);
-  EXPECT_TRUE(WaitFor(30, [&] { return Says(console, {"Set the jaw to 0 deg", "\"wants_enter\":true"}); }));
+  EXPECT_TRUE(WaitFor(120, [&] { return Says(console, {"Set the jaw to 0 deg", "\"wants_enter\":true"}); }));
   EXPECT_EQ(console.Post("/api/start", "scene=small").status, 409);
   EXPECT_EQ(console.Post("/api/task/enter").status, 200);
-  EXPECT_TRUE(WaitFor(30, [&] {
+  EXPECT_TRUE(WaitFor(120, [&] {
     return Says(console, {"taken from", "Set the jaw to 15 deg", "\"wants_enter\":true"});
   })) << console.Get("/api/state").body;
   EXPECT_EQ(console.Post("/api/task/cancel").status, 200);
-  EXPECT_TRUE(WaitFor(30, [&] { return Says(console, {"\"running\":false", "\"cancelled\":true"}); }));
+  EXPECT_TRUE(WaitFor(120, [&] { return Says(console, {"\"running\":false", "\"cancelled\":true"}); }));
   EXPECT_EQ(console.Post("/api/task/close").status, 200);
   EXPECT_EQ(console.Get("/api/state").body.find("\"task\""), std::string::npos);
 }

@@ -52,7 +52,7 @@ void OddPicture(scene::SceneData* data) {
 }
 
 std::string SaidBy(const std::string& program, const std::vector<std::string>& arguments, int wanted_code) {
-  constexpr double kPatience_s = 100;  // A software rasteriser on a busy machine.
+  constexpr double kPatience_s = 300;  // A software rasteriser on a busy machine.
   fulcrum::testing::Program run(program, arguments);
   std::optional<int> code;
   fulcrum::testing::WaitFor(kPatience_s, [&] { return (code = run.Poll()).has_value(); });
