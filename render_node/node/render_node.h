@@ -52,8 +52,8 @@ struct RenderSettings {
   Quality quality = Quality::kAuto;  ///< Resolution of the scene.
   std::filesystem::path frames;      ///< Folder for the pictures; empty: no files.
   InputSettings inputs = {};         ///< Gamepads as hands.
-  Look look = {};                    ///< Of a stage that the node makes.
   std::uint64_t keep_free_B = 0;     ///< Space that the pictures leave free on their disk [B].
+  Look look = {};                    ///< Of a stage that the node makes.
 };
 
 class RenderNode {
