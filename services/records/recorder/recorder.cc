@@ -58,7 +58,7 @@ void Recorder::Introduce(recording::McapWriter* file) const {
   file->AddMetadata("clock", {{"log_time_minus_monotonic_ns", std::to_string(wall_minus_monotonic_ns_)}});
 }
 
-void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>& is_whole) {
+void Recorder::Receive(const bus::RawSample& sample) {
   const std::size_t size = sample.head.size() + sample.body.size();
   const std::lock_guard lock(mutex_);
   Counts& counts = counts_[static_cast<std::size_t>(sample.topic)];
@@ -83,7 +83,6 @@ void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>
     at += recording::kMessageHead;
     std::memcpy(at, sample.head.data(), sample.head.size());
     if (!sample.body.empty()) std::memcpy(at + sample.head.size(), sample.body.data(), sample.body.size());
-    if (!is_whole()) return;  // Missed: the gap in the sequence is counted at the next sample.
     if (filling_.used() == 0) filling_.Begin(written_ns);
     filling_.CutIfDue(written_ns);
     (IsLarge(sample.topic) ? filling_.large : filling_.small).used += recording::kMessageHead + size;

@@ -72,7 +72,7 @@ class Recorder {
   Recorder& operator=(const Recorder&) = delete;
 
   /// Takes over a sample. May be called on any thread.
-  void Receive(const bus::RawSample& sample, const std::function<bool()>& is_whole);
+  void Receive(const bus::RawSample& sample);
 
   // The following functions are for the writing thread only.
   /// Writes the received samples once they fill a chunk or are kLongestChunk_ns old. Ends the recording when its room

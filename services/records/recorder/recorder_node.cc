@@ -75,9 +75,9 @@ RecorderNode::RecorderNode(app::NodeApp* app, const RecorderSettings& settings)
 void RecorderNode::ReceiveAllTopics(app::NodeApp* app) {
   for (const auto& role : bus::kTopicRoles) {
     if (!role.recorded()) continue;
-    inputs_.push_back(bus_.MakeRawInput(role.id, [this](const bus::RawSample& sample, const auto& is_whole) {
+    inputs_.push_back(bus_.MakeRawInput(role.id, [this](const bus::RawSample& sample) {
       RunBeforeOtherPrograms();
-      recorder_.Receive(sample, is_whole);
+      recorder_.Receive(sample);
     }));
     app->Watch(role.id, [this, id = role.id, input = inputs_.back().get()] {
       bus::InputStats stats = recorder_.topic_stats(id);

@@ -47,12 +47,6 @@ class InputAccount {
     if (stamp.sequence != 0) Follow(stamp);  // 0: the bytes could not be decoded.
   }
 
-  /// Counts a sample that was skipped because a newer one was requested.
-  void Supersede(const Stamp& stamp) noexcept {
-    received_.fetch_add(1, std::memory_order_relaxed);
-    Follow(stamp);
-  }
-
   [[nodiscard]] InputStats stats(bool matched) const noexcept {
     InputStats s;
     s.matched = matched;

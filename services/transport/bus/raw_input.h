@@ -36,10 +36,9 @@ struct Peer {
   int pid = 0;
 };
 
-/// Receives samples; called on threads of the bus, must be short and must not throw. The memory of a sample of a large
-/// topic is reused by its writer after some time: `is_whole`, called after copying, returns whether the copy was
-/// complete before.
-using RawSink = std::function<void(const RawSample& sample, const std::function<bool()>& is_whole)>;
+/// Receives samples, whose memory is valid during the call; called on threads of the bus, must be short and must not
+/// throw.
+using RawSink = std::function<void(const RawSample& sample)>;
 
 /// Receives one topic from its construction to its destruction. Where the participant has `gathers` set, small samples
 /// arrive up to 8 ms late, many at a time.

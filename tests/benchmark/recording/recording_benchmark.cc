@@ -175,7 +175,7 @@ class Second {
   std::uint64_t Receive(recorder::Recorder* recorder) {
     std::uint64_t bytes = 0;
     const auto put = [&](TopicId topic, const std::vector<std::byte>& body, std::uint64_t* sequence) {
-      recorder->Receive({topic, {1}, ++*sequence, 0, MonotonicNs(), head_, body}, [] { return true; });
+      recorder->Receive({topic, {1}, ++*sequence, 0, MonotonicNs(), head_, body});
       bytes += head_.size() + body.size();
     };
     for (int ms = 0; ms < 1000; ++ms) {

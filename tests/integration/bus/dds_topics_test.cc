@@ -212,7 +212,7 @@ TEST(DdsOutput, AReliableStreamIsNotAnsweredSampleBySample) {
 TEST(RawInput, HearsAllThatAWriterSaidBeforeItLeft) {
   DdsParticipant listener({.domain = kDomain, .node_name = "listener", .shared_memory = {}, .gathers = true});
   std::atomic<int> heard{0};
-  const auto input = listener.MakeRawInput(TopicId::kToolState, [&](const RawSample&, const auto&) { ++heard; });
+  const auto input = listener.MakeRawInput(TopicId::kToolState, [&](const RawSample&) { ++heard; });
   constexpr int kSamples = 40;
   for (int writer = 1; writer <= 5; ++writer) {
     ASSERT_TRUE(Eventually([&] { return !input->matched(); })) << "the previous writer has left";
@@ -231,7 +231,7 @@ TEST(RawInput, HearsAllThatAWriterSaidBeforeItLeft) {
 TEST(RawInput, ReadsTheFirstSampleOfAWriterThatBothSidesHaveMatched) {
   DdsParticipant recorder({.domain = kDomain, .node_name = kRecorderPeer, .shared_memory = {}});
   std::atomic<int> received{0};
-  const auto take = [&](const RawSample&, const auto&) { ++received; };
+  const auto take = [&](const RawSample&) { ++received; };
   const auto tools = recorder.MakeRawInput(TopicId::kToolState, take);
   const auto contacts = recorder.MakeRawInput(TopicId::kContactModel, take);
   for (int run = 1; run <= 20; ++run) {
@@ -327,6 +327,35 @@ TEST(DdsOutput, AFrameLargerThanItsWritersMemoryIsNotSent) {
     return out->Write(frame) && in->TakeLatest(&got);
   }));
   EXPECT_EQ(got.xyz, frame.xyz);
+}
+
+/// When the library learns that a writer has left it unmaps its pool, also beneath a sample that is being read.
+TEST(DdsInput, AWriterMayLeaveWhileItsFramesAreRead) {
+  DdsParticipant reader({.domain = kDomain, .node_name = "reader", .shared_memory = {}});
+  const auto in = reader.MakeInput<TissueFrame>();
+  TissueFrame frame = test::Sample<TissueFrame>();
+  frame.header.vertex_count = kMaxTissueVertices;
+  frame.xyz.assign(std::size_t{3} * kMaxTissueVertices, 0.01f);
+  for (int writer = 0; writer < 30; ++writer) {
+    DdsParticipant node({.domain = kDomain, .node_name = "writer", .shared_memory = {}});
+    auto out = node.MakeOutput<TissueFrame>();
+    TissueFrame got;
+    ASSERT_TRUE(Eventually([&] {
+      ++frame.header.stamp.sequence;
+      return out->Write(frame) && in->TakeLatest(&got);
+    }));
+    for (int i = 0; i < 4; ++i) {
+      ++frame.header.stamp.sequence;
+      EXPECT_TRUE(out->Write(frame));
+    }
+    std::thread reading([&] {
+      const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(30);
+      while (std::chrono::steady_clock::now() < end) (void)in->TakeNext(&got);
+    });
+    std::this_thread::sleep_for(std::chrono::microseconds(200 * (writer % 8)));
+    out.reset();
+    reading.join();
+  }
 }
 
 TEST(DdsOutput, FillThatThrowsIsCountedAndItsLoanComesBack) {

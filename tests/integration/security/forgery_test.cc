@@ -83,7 +83,7 @@ class Forgery : public ::testing::Test {
     recorder_ = Join("recorder");
     tools_ = servo_->MakeOutput<ToolState>();
     heard_ = physics_->MakeInput<ToolState>();
-    raw_ = recorder_->MakeRawInput(TopicId::kToolState, [this](const bus::RawSample& sample, const auto&) {
+    raw_ = recorder_->MakeRawInput(TopicId::kToolState, [this](const bus::RawSample& sample) {
       std::vector<std::uint8_t> bytes;
       for (const auto& part : {sample.head, sample.body}) {
         for (const std::byte byte : part) bytes.push_back(std::to_integer<std::uint8_t>(byte));

@@ -45,10 +45,10 @@ class RecorderTest : public testing::Test {
   }
   /// Sends a sample of `size` bytes, encapsulation included, at `now_ns`.
   static void Send(Recorder* recorder, TopicId topic, std::uint8_t writer, std::uint64_t sequence,
-                   std::size_t size = 40, std::int64_t now_ns = 0, bool whole = true) {
+                   std::size_t size = 40, std::int64_t now_ns = 0) {
     const std::vector<std::byte> body(size - kHead.size(), static_cast<std::byte>(sequence));
     bus::RawSample sample{topic, {writer}, sequence, 1000 + now_ns, now_ns, kHead, body};
-    recorder->Receive(sample, [whole] { return whole; });
+    recorder->Receive(sample);
   }
   static std::vector<Read> ReadAll(McapReader* reader) {
     std::vector<Read> all;

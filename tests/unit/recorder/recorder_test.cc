@@ -116,9 +116,9 @@ TEST_F(RecorderTest, WhatIsMissingIsCountedByTopicAndWrittenIntoTheFile) {
   {
     Recorder recorder(settings);
     Send(&recorder, TopicId::kToolState, 1, 100);
-    Send(&recorder, TopicId::kToolState, 1, 104);                // three are missing
-    Send(&recorder, TopicId::kTissueFrame, 1, 1, 40, 0, false);  // overwritten while it was copied
-    Send(&recorder, TopicId::kTissueFrame, 1, 2);
+    Send(&recorder, TopicId::kToolState, 1, 104);  // three are missing
+    Send(&recorder, TopicId::kTissueFrame, 1, 1);
+    Send(&recorder, TopicId::kTissueFrame, 1, 3);
     Send(&recorder, TopicId::kHealth, 1, 1, 2000);  // no room
     Send(&recorder, TopicId::kHealth, 1, 1);        // a late copy is ignored
     EXPECT_EQ(recorder.stats().missed, 4u);
@@ -129,7 +129,7 @@ TEST_F(RecorderTest, WhatIsMissingIsCountedByTopicAndWrittenIntoTheFile) {
     EXPECT_EQ(recorder.topic_stats(TopicId::kToolState).received, 2u);
   }
   McapReader reader(folder_ / "recording.mcap");
-  EXPECT_EQ(ReadAll(&reader).size(), 3u);
+  EXPECT_EQ(ReadAll(&reader).size(), 4u);
   EXPECT_EQ(reader.metadata().at("lost ToolState").at("not_received"), "3");
   EXPECT_EQ(reader.metadata().at("lost Health").at("queue_full"), "1");
 }

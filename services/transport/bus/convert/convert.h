@@ -54,9 +54,5 @@ void SpoilLoan(std::span<std::byte> loan);
 void SetSessionOfLoan(std::uint64_t session, std::byte* loan);
 /// Session of a serialised message: CDR without encapsulation, or a loan; 0: the bytes are too few.
 [[nodiscard]] std::uint64_t SessionOf(std::span<const std::byte> message);
-/// Reads only the stamp, for samples that are skipped.
-[[nodiscard]] Stamp StampOfLoan(const std::byte* loan, const TissueFrame*);
-[[nodiscard]] Stamp StampOfLoan(const std::byte* loan, const TemperaturePatch*);
-[[nodiscard]] Stamp StampOfLoan(const std::byte* loan, const Picture*);
 
 }  // namespace fulcrum::bus

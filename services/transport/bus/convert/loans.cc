@@ -41,14 +41,6 @@ void GetHeader(const std::byte* loan, Header* header) {
   std::memcpy(static_cast<void*>(&wire), loan, sizeof wire);
   convert::Get(wire, header);
 }
-template <class WireHeader>
-Stamp StampOfHeader(const std::byte* loan) {
-  WireHeader wire;
-  std::memcpy(static_cast<void*>(&wire), loan, sizeof wire);
-  Stamp stamp;
-  convert::Get(wire.stamp(), &stamp);
-  return stamp;
-}
 
 }  // namespace
 
@@ -127,8 +119,6 @@ bool FromLoan(std::span<const std::byte> loan, TissueFrame* to) {
   return true;
 }
 
-Stamp StampOfLoan(const std::byte* loan, const TissueFrame*) { return StampOfHeader<idl::TissueFrameHeader>(loan); }
-
 TemperaturePatch::View OpenLoan(std::byte* loan, TemperaturePatch* draft) {
   draft->header = {};
   return {draft->header, {reinterpret_cast<std::uint8_t*>(loan + kPatchOffset), idl::PATCH_BYTES}};
@@ -150,10 +140,6 @@ bool FromLoan(std::span<const std::byte> loan, TemperaturePatch* to) {
   const auto* texels = reinterpret_cast<const std::uint8_t*>(loan.data() + kPatchOffset);
   to->texels.assign(texels, texels + idl::PATCH_BYTES);
   return true;
-}
-
-Stamp StampOfLoan(const std::byte* loan, const TemperaturePatch*) {
-  return StampOfHeader<idl::TemperaturePatchHeader>(loan);
 }
 
 Picture::View OpenLoan(std::byte* loan, Picture* draft) {
@@ -181,7 +167,5 @@ bool FromLoan(std::span<const std::byte> loan, Picture* to) {
   to->jpeg.assign(jpeg, jpeg + to->header.size);
   return true;
 }
-
-Stamp StampOfLoan(const std::byte* loan, const Picture*) { return StampOfHeader<idl::PictureHeader>(loan); }
 
 }  // namespace fulcrum::bus

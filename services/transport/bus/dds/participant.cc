@@ -311,9 +311,8 @@ std::unique_ptr<RawInput> DdsParticipant::MakeRawInput(TopicId id, RawSink sink)
   const std::uint32_t payload_B = WithMessageOf(id, [this]<class T>(std::type_identity<T>) {
     return std::unique_ptr<fast::TopicDataType>(impl_->MakeType<T>())->m_typeSize;
   });
-  const bool plain = role.quality.path == Path::kSharedMemory;
   fast::Topic* topic =
-      impl_->MakeTopic(role, fast::TypeSupport(new dds::RawType(impl_->TypeName(role), payload_B, plain)));
+      impl_->MakeTopic(role, fast::TypeSupport(new dds::RawType(impl_->TypeName(role), payload_B, role)));
   fast::DataReaderQos qos;
   Apply(role.quality, role.quality.reader_depth, impl_->SharedMemoryFor(role), &qos);
   qos.reliable_reader_qos().times.initialAcknackDelay = kFirstAcknack;

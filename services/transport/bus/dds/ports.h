@@ -5,7 +5,6 @@
 #include <atomic>
 #include <chrono>
 #include <cstddef>
-#include <fastdds/dds/core/LoanableSequence.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
@@ -17,6 +16,7 @@
 #include <span>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "services/transport/bus/convert/convert.h"
 #include "services/transport/bus/dds/abandoned_mutex.h"
@@ -157,64 +157,47 @@ class DdsInput final : public InputBase<T> {
   T candidate_;
 };
 
-/// Input of a large topic: reads the samples in the memory in which they were written.
+/// Input of a large topic. A sample is copied out of the shared memory while the library holds the reader's lock
+/// (LoanType::deserialize): when the writer's process has ended, the library removes that memory from this process,
+/// also beneath a loan.
 template <Loanable T>
 class DdsInput<T> final : public InputBase<T> {
  public:
   /// @param loan_B size of the topic's type in this participant.
   DdsInput(std::size_t loan_B, fast::Subscriber* subscriber, fast::Topic* topic, const fast::DataReaderQos& qos,
            std::function<void()> notify, SessionCheck* check)
-      : InputBase<T>(subscriber, topic, qos, std::move(notify), check), loan_B_(loan_B) {}
+      : InputBase<T>(subscriber, topic, qos, std::move(notify), check), bytes_(loan_B) {}
 
-  bool TakeLatest(T* sample) override { return Take(kQualityOf<T>.reader_depth, sample); }
-  bool TakeNext(T* sample) override { return Take(1, sample); }
-
- private:
-  /// Takes the newest valid one of the `count` oldest samples; with 1, continues until one is valid or none is left.
-  bool Take(int count, T* sample) {
+  bool TakeLatest(T* sample) override {
     bool found = false;
-    try {
-      while (!found && this->reader_->take(loans_, infos_, count) == ReturnCode::RETCODE_OK) {
-        found = Choose(sample);
-        this->reader_->return_loan(loans_, infos_);
-      }
-    } catch (...) {
-      this->account_.Reject();
-    }
+    while (TakeNext(sample)) found = true;
     return found;
   }
 
-  bool Choose(T* sample) {
-    auto* const* data = loans_.buffer();
-    // The library does not say how large a sample is. By UDP it has the size of this participant's type; in shared
-    // memory that of its writer's, which has checked that the content fits (CloseLoan).
-    const auto loan = [this, data](int i) { return std::span(reinterpret_cast<const std::byte*>(data[i]), loan_B_); };
-    for (int i = static_cast<int>(infos_.length()) - 1; i >= 0; --i) {
-      if (!infos_[i].valid_data) continue;
-      const std::uint64_t session = SessionOf(loan(i));
-      const bool complete = FromLoan(loan(i), &candidate_);
-      // The writer may have reused the memory during the copy: only now is it known whether the copy is complete.
-      if (!this->reader_->is_sample_valid(data[i], &infos_[i])) continue;
-      if (this->check_->IsForeign(session)) continue;
-      if (!complete || !PassesGate(candidate_) || !this->IsOfOwner(candidate_)) {
-        this->account_.Reject();
-        continue;
+  bool TakeNext(T* sample) override {
+    while (TakeBytes()) {
+      if (this->check_->IsForeign(SessionOf(bytes_))) continue;
+      if (FromLoan(bytes_, &candidate_) && PassesGate(candidate_) && this->IsOfOwner(candidate_)) {
+        this->account_.Accept(StampOf(candidate_));
+        std::swap(*sample, candidate_);
+        return true;
       }
-      for (int older = 0; older < i; ++older) {
-        if (!infos_[older].valid_data) continue;
-        if (this->check_->IsForeign(SessionOf(loan(older)))) continue;
-        this->account_.Supersede(StampOfLoan(loan(older).data(), sample));
-      }
-      this->account_.Accept(StampOf(candidate_));
-      std::swap(*sample, candidate_);
-      return true;
+      this->account_.Reject();
     }
     return false;
   }
 
-  const std::size_t loan_B_;
-  fast::LoanableSequence<std::byte> loans_;
-  fast::SampleInfoSeq infos_;
+ private:
+  /// Takes the next valid sample into bytes_.
+  bool TakeBytes() {
+    fast::SampleInfo info;
+    do {
+      if (this->reader_->take_next_sample(bytes_.data(), &info) != ReturnCode::RETCODE_OK) return false;
+    } while (!info.valid_data);
+    return true;
+  }
+
+  std::vector<std::byte> bytes_;
   T candidate_;
 };
 

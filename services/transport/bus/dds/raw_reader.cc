@@ -14,7 +14,8 @@ namespace {
 using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
 
 /// Encapsulation in front of a loan's content on the wire: CDR, little endian.
-constexpr std::array<std::byte, 4> kEncapsulation{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}};
+constexpr std::array<std::byte, kEncapsulation_B> kEncapsulation{std::byte{0}, std::byte{1}, std::byte{0},
+                                                                 std::byte{0}};
 
 /// A sample of at most this age was waited for; an older one was in the socket, which may contain more [ns].
 constexpr std::int64_t kFresh_ns = 500'000;
@@ -41,7 +42,6 @@ RawReader::RawReader(fast::Subscriber* subscriber, fast::Topic* topic, const fas
                      std::uint32_t payload_B, RawSink sink, std::shared_ptr<Gathering> gathering, Sources* sources,
                      SessionCheck* check)
     : role_(RoleOf(id)),
-      payload_B_(payload_B),
       sink_(std::move(sink)),
       gathering_(std::move(gathering)),
       sources_(sources),
@@ -78,46 +78,27 @@ RawSample RawReader::Describe(const fast::SampleInfo& info) const {
 
 void RawReader::on_data_available(fast::DataReader* reader) {
   try {
-    role_.quality.path == Path::kSharedMemory ? TakeLoans(reader) : TakeCopies(reader);
+    Take(reader);
   } catch (...) {
     // A sample that cannot be taken is missing in its writer's sequence, where it is counted.
   }
 }
 
-void RawReader::TakeCopies(fast::DataReader* reader) {
+void RawReader::Take(fast::DataReader* reader) {
+  const bool large = role_.quality.path == Path::kSharedMemory;
   fast::SampleInfo info;
   std::optional<std::int64_t> age_ns;
   while (reader->take_next_sample(&payload_, &info) == ReturnCode::RETCODE_OK) {
-    if (!info.valid_data || payload_.size() < kEncapsulation.size()) continue;
+    if (!info.valid_data || payload_.size() < kEncapsulation_B) continue;
     RawSample sample = Describe(info);
-    sample.head = std::span(payload_).first(kEncapsulation.size());
-    sample.body = std::span(payload_).subspan(kEncapsulation.size());
+    // In a loan nobody has written it.
+    sample.head = large ? std::span<const std::byte>(kEncapsulation) : std::span(payload_).first(kEncapsulation_B);
+    sample.body = std::span(payload_).subspan(kEncapsulation_B);
     if (check_->IsForeign(SessionOf(sample.body))) continue;
-    sink_(sample, [] { return true; });
-    age_ns = Age(sample.source_ns);
+    sink_(sample);
+    if (!large) age_ns = Age(sample.source_ns);
   }
   if (age_ns && gathering_) gathering_->caught_up = *age_ns <= kFresh_ns;
-}
-
-void RawReader::TakeLoans(fast::DataReader* reader) {
-  while (reader->take(loans_, infos_, role_.quality.reader_depth) == ReturnCode::RETCODE_OK) {
-    for (int i = 0; i < static_cast<int>(infos_.length()); ++i) {
-      if (!infos_[i].valid_data) continue;
-      const auto* loan = static_cast<const std::byte*>(loans_.buffer()[i]);
-      RawSample sample = Describe(infos_[i]);
-      sample.head = kEncapsulation;
-      const std::span whole(loan, payload_B_ - kEncapsulation.size());
-      sample.body = whole.first(std::min(whole.size(), NeededBytes(role_.id, whole)));
-      if (check_->IsForeign(SessionOf(sample.body))) continue;
-      struct {
-        fast::DataReader* reader;
-        const std::byte* loan;
-        const fast::SampleInfo* info;
-      } const at{reader, loan, &infos_[i]};
-      sink_(sample, [&at] { return at.reader->is_sample_valid(at.loan, at.info); });
-    }
-    reader->return_loan(loans_, infos_);
-  }
 }
 
 }  // namespace fulcrum::bus::dds

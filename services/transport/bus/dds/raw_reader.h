@@ -1,8 +1,9 @@
 // The DDS backend of RawInput. Internal to services/transport/bus/dds.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
-#include <fastdds/dds/core/LoanableSequence.hpp>
+#include <cstddef>
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
@@ -10,11 +11,14 @@
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
 #include <memory>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "services/transport/bus/dds/chained_transport.h"
 #include "services/transport/bus/dds/session_check.h"
 #include "services/transport/bus/dds/sources.h"
+#include "services/transport/bus/dds/type_support.h"
 #include "services/transport/bus/raw_input.h"
 #include "services/transport/bus/topics.h"
 
@@ -23,11 +27,13 @@ namespace fulcrum::bus::dds {
 namespace fast = eprosima::fastdds::dds;
 namespace rtps = eprosima::fastrtps::rtps;
 
-/// Stands for any type by name and size: a sample is its payload. For readers only.
+/// Stands for any type by name and size: a sample is its payload, of a large topic as many bytes of it as the message
+/// needs. For readers only.
 class RawType final : public fast::TopicDataType {
  public:
   /// @param payload_B largest payload, encapsulation included.
-  RawType(const std::string& name, std::uint32_t payload_B, bool plain) : plain_(plain) {
+  RawType(const std::string& name, std::uint32_t payload_B, const TopicRole& role)
+      : topic_(role.id), plain_(role.quality.path == Path::kSharedMemory) {
     setName(name.c_str());
     m_typeSize = payload_B;
     auto_fill_type_object(false);
@@ -35,9 +41,12 @@ class RawType final : public fast::TopicDataType {
   }
   bool serialize(void*, rtps::SerializedPayload_t*) override { return false; }
   bool deserialize(rtps::SerializedPayload_t* payload, void* data) override {
-    static_cast<std::vector<std::byte>*>(data)->assign(
-        reinterpret_cast<const std::byte*>(payload->data),
-        reinterpret_cast<const std::byte*>(payload->data) + payload->length);
+    std::span whole(reinterpret_cast<const std::byte*>(payload->data), payload->length);
+    if (plain_ && whole.size() > kEncapsulation_B) {
+      const std::size_t needed_B = kEncapsulation_B + NeededBytes(topic_, whole.subspan(kEncapsulation_B));
+      whole = whole.first(std::min(whole.size(), needed_B));
+    }
+    static_cast<std::vector<std::byte>*>(data)->assign(whole.begin(), whole.end());
     return true;
   }
   std::function<std::uint32_t()> getSerializedSizeProvider(void*) override {
@@ -50,6 +59,7 @@ class RawType final : public fast::TopicDataType {
   [[nodiscard]] bool is_plain() const override { return plain_; }
 
  private:
+  const TopicId topic_;
   const bool plain_;
 };
 
@@ -73,12 +83,10 @@ class RawReader final : public RawInput, private fast::DataReaderListener {
     sources_->Count(rtps::iHandle2GUID(status.last_publication_handle).guidPrefix, status.current_count_change);
   }
   void on_data_available(fast::DataReader* reader) override;
-  void TakeCopies(fast::DataReader* reader);
-  void TakeLoans(fast::DataReader* reader);
+  void Take(fast::DataReader* reader);
   [[nodiscard]] RawSample Describe(const fast::SampleInfo& info) const;
 
   const TopicRole& role_;
-  const std::uint32_t payload_B_;
   const RawSink sink_;
   const std::shared_ptr<Gathering> gathering_;  ///< Null: samples do not gather.
   Sources* const sources_;
@@ -87,8 +95,6 @@ class RawReader final : public RawInput, private fast::DataReaderListener {
   fast::DataReader* reader_;
   std::atomic<int> writers_{0};
   std::vector<std::byte> payload_;
-  fast::LoanableSequence<std::byte> loans_;
-  fast::SampleInfoSeq infos_;
 };
 
 }  // namespace fulcrum::bus::dds

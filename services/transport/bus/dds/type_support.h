@@ -39,7 +39,7 @@ class CheckedType final : public TypeSupportOf<T>::type {
 };
 
 /// A large topic: its samples are bytes, which the library takes for a plain type of the size that the pools are to
-/// have. A writer fills loans of it; a reader gets the writer's loan, or the bytes that came by UDP.
+/// have. A writer fills loans of it; a reader copies the writer's loan, or the bytes that came by UDP.
 class LoanType final : public eprosima::fastdds::dds::TopicDataType {
  public:
   /// @param loan_B largest message.
@@ -50,7 +50,8 @@ class LoanType final : public eprosima::fastdds::dds::TopicDataType {
   }
 
   bool serialize(void*, eprosima::fastrtps::rtps::SerializedPayload_t*) override { return false; }
-  /// For samples that are taken as copies. What is cut short becomes a message that no gate accepts.
+  /// Copies as many bytes as the message needs. What is cut short becomes a message that no gate accepts. In shared
+  /// memory the writer may be writing the next message meanwhile: the library drops such a copy.
   bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
     const std::span loan(static_cast<std::byte*>(data), loan_B_);
     const std::size_t head_B = std::min<std::size_t>(payload->length, kEncapsulation_B);
