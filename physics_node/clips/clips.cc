@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "physics_node/clips/rigid_fit.h"
+#include "services/base/core/sheets.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -65,7 +66,9 @@ std::optional<std::array<Index, 3>> WidestTriangle(std::span<const Index> tissue
 
 Clips::Clips(const TissueScene& scene)
     : possible_(std::any_of(scene.tools.begin(), scene.tools.end(),
-                            [](const ToolDescription& tool) { return tool.kind == ToolKind::kClipApplier; })) {
+                            [](const ToolDescription& tool) { return tool.kind == ToolKind::kClipApplier; })),
+      columns_(scene.membrane.cols),
+      sheet_of_rows_(SheetOfRows(scene)) {
   if (possible_) {
     clips_.reserve(kMaxClips);
     elements_.reserve(kMaxClips);
@@ -76,14 +79,21 @@ bool Clips::IsClipped(Index particle) const {
   return std::any_of(clips_.begin(), clips_.end(), [particle](const AppliedClip& clip) { return Has(clip, particle); });
 }
 
-bool Clips::Anchor(const ClipPose& pose, const ParticleStore& particles, AppliedClip* clip) {
-  std::vector<Index> all, of_sheets;
+bool Clips::Anchor(const ClipPose& pose, const ParticleStore& particles, AppliedClip* clip) const {
+  std::vector<Index> all;
+  std::array<std::vector<Index>, kMaxSheets> of_sheets;
   for (const ClippedParticle& clipped : clip->tissue) {
     all.push_back(clipped.particle);
-    if (clipped.particle >= particles.tube_count()) of_sheets.push_back(clipped.particle);
+    if (clipped.particle < particles.tube_count()) continue;
+    of_sheets[sheet_of_rows_[(clipped.particle - particles.tube_count()) / columns_]].push_back(clipped.particle);
   }
-  // What reads where a clip closes the vessels of a sheet needs places on the sheet.
-  auto anchors = WidestTriangle(of_sheets, particles);
+  // What reads where a clip closes the vessels of a sheet needs places on one sheet.
+  std::stable_sort(of_sheets.begin(), of_sheets.end(),
+                   [](const auto& a, const auto& b) { return a.size() > b.size(); });
+  std::optional<std::array<Index, 3>> anchors;
+  for (const std::vector<Index>& of_sheet : of_sheets) {
+    if (!anchors) anchors = WidestTriangle(of_sheet, particles);
+  }
   if (!anchors) anchors = WidestTriangle(all, particles);
   if (!anchors) return false;
   clip->placed.anchors = *anchors;
@@ -145,7 +155,7 @@ void Clips::DropDead(const TissueModel& model, const ParticleStore& particles) {
   }
 }
 
-bool Clips::AnchorAnew(const ParticleStore& particles, Element* e, AppliedClip* clip) {
+bool Clips::AnchorAnew(const ParticleStore& particles, Element* e, AppliedClip* clip) const {
   const float* const place = particles.raw().data();
   if (!Fit(place, e)) return false;
   clip->q_WC = e->turn.cast<float>();

@@ -128,13 +128,16 @@ class Clips {
   /// False, with nothing changed, at places that are not finite.
   static bool Fit(const float* place, Element* e);
   [[nodiscard]] static Element MakeElement(const AppliedClip& clip, const ParticleStore& particles);
-  /// Places the clip relative to three of its particles far from each other; false: they are in one line.
-  [[nodiscard]] static bool Anchor(const ClipPose& pose, const ParticleStore& particles, AppliedClip* clip);
+  /// Places the clip relative to three of its particles far from each other, if possible all of the sheet that it holds
+  /// most nodes of; false: they are in one line.
+  [[nodiscard]] bool Anchor(const ClipPose& pose, const ParticleStore& particles, AppliedClip* clip) const;
   /// The same, at where its particles are now.
-  [[nodiscard]] static bool AnchorAnew(const ParticleStore& particles, Element* e, AppliedClip* clip);
+  [[nodiscard]] bool AnchorAnew(const ParticleStore& particles, Element* e, AppliedClip* clip) const;
   [[nodiscard]] bool IsClipped(Index particle) const;
 
   bool possible_;
+  Index columns_;                           ///< Of the sheets' grid.
+  std::vector<std::size_t> sheet_of_rows_;  ///< Of that grid.
   std::vector<AppliedClip> clips_;
   std::vector<Element> elements_;  ///< By clip.
   std::uint32_t lost_ = 0, refused_ = 0;

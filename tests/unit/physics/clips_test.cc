@@ -255,6 +255,25 @@ TEST(Clips, AreAnchoredOnTheSheetWhereTheyHoldSomeOfIt) {
   for (const Index anchor : anchors_of(of_the_organ)) EXPECT_LT(anchor, scene.tube_vertex_count);
 }
 
+TEST(Clips, AreAnchoredOnTheSheetThatTheyHoldMostOf) {
+  scene::SceneData data = scene::BuildProcedural(scene::Small());
+  data.fixed.tools[0] = {ToolKind::kClipApplier, Vec3f(0, 0, 0.15f), 0.0025f, 0.3f, 0.001f, 0.008f};
+  const std::uint32_t rows = data.View().membrane.rows, cols = data.View().membrane.cols, second_row = rows / 16 * 8;
+  data.sheets = {{"front", 0, second_row - 1, cols, 0}, {"back", second_row, rows - second_row, cols, 0}};
+  const SceneView scene = data.View();
+  const Index first = scene.membrane.first, back = first + second_row * cols;
+  // Three nodes of the one sheet, farther apart than the four of the other.
+  std::vector<Index> held{first + 3, first + 8 * cols + 20, first + 5};
+  for (const Index next : {0u, 1u, cols, cols + 1}) held.push_back(back + 2 * cols + 10 + next);
+  const ParticleStore particles(scene);
+  Clips clips(scene);
+  ASSERT_TRUE(
+      clips.Apply(0, scene.tools[0], {scene.rest_position[held.back()], Quatf::Identity(), 0}, held, particles));
+  ClipState state;
+  clips.Fill(&state);
+  for (const Index anchor : state.clips[0].anchors) EXPECT_GE(anchor, back);
+}
+
 TEST_F(ClipOnTwoLayers, TwoClipsShareNoParticle) {
   EXPECT_FALSE(clips_.Apply(0, scene_.tools[0], pose_, held_, particles_));
   EXPECT_EQ(clips_.refused(), 1u);
