@@ -24,7 +24,7 @@ struct CyclicThreadSettings {
   /// Called on the thread after each period: time until which nothing can happen [CLOCK_MONOTONIC, ns]. The thread
   /// omits the periods that end before it, or until `bell` rings; they count as ticks, since none is late. Null: it
   /// omits none. Given with `bell`, which outlives the thread.
-  std::function<std::int64_t()> rests_until;
+  std::function<std::int64_t()> rests_until = nullptr;
   Bell* bell = nullptr;
   int cpu = -1;  ///< CPU to which the thread is pinned; -1: any.
 };

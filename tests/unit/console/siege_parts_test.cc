@@ -128,13 +128,13 @@ TEST_F(TlsFolder, KeepsItsIdentityUntilItEnds) {
 }
 
 TEST_F(TlsFolder, AnIdentityMadeWhileTheClockWasAheadIsRenewed) {
-  constexpr std::time_t kNow = 1'800'000'000, kDay = 24 * 3600;
-  const TlsIdentity ahead = Load(kNow + 400 * kDay);
-  const TlsIdentity renewed = Load(kNow);
+  constexpr std::time_t kToday = 1'800'000'000, kDay = 24 * 3600;
+  const TlsIdentity ahead = Load(kToday + 400 * kDay);
+  const TlsIdentity renewed = Load(kToday);
   EXPECT_TRUE(made_);
   EXPECT_NE(renewed.fingerprint, ahead.fingerprint);
-  EXPECT_LT(renewed.from, kNow);
-  (void)Load(kNow);
+  EXPECT_LT(renewed.from, kToday);
+  (void)Load(kToday);
   EXPECT_FALSE(made_);
 }
 

@@ -407,7 +407,7 @@ TEST_F(LogTools, RecordedPositionsAreThoseOfTheBus) {
       constexpr std::size_t kEncapsulation_B = 4;
       sample.head = std::as_bytes(std::span(bytes)).first(kEncapsulation_B);
       sample.body = std::as_bytes(std::span(bytes)).subspan(kEncapsulation_B);
-      recorder.Receive(sample, [] { return true; });
+      recorder.Receive(sample);
       sent.push_back(std::move(frame));
     }
   }

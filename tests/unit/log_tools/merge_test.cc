@@ -29,7 +29,7 @@ class Merging : public testing::Test {
   static void Send(recorder::Recorder* recorder, TopicId topic, std::uint8_t writer, std::uint64_t sequence,
                    std::int64_t now_ns) {
     const std::vector<std::byte> body(40, static_cast<std::byte>(sequence));
-    recorder->Receive({topic, {writer}, sequence, 1000 + now_ns, now_ns, kHead, body}, [] { return true; });
+    recorder->Receive({topic, {writer}, sequence, 1000 + now_ns, now_ns, kHead, body});
   }
   /// Each of `writer`'s ToolStates from `first` to `last`, one a millisecond, and a frame every ten.
   fs::path Record(const std::string& name, std::uint64_t first, std::uint64_t last, const std::string& session = "s-1",

@@ -29,7 +29,7 @@ TEST(ContactRest, PublishesEachTickUntilNothingHasChangedForTenAndTheFirstChange
   EXPECT_EQ(published, 25);
   for (int i = 1; i <= 40; ++i) {
     (void)due(true);
-    if (i > 10) EXPECT_EQ(rest.due(), i % 10 == 7) << i << ": a servo that is silent does not silence physics";
+    EXPECT_TRUE(i <= 10 || rest.due() == (i % 10 == 7)) << i << ": a servo that is silent does not silence physics";
   }
   EXPECT_TRUE(due(false)) << "tissue has woken";
   for (int i = 0; i < 11; ++i) (void)due(true);

@@ -71,7 +71,7 @@ class Frames {
     for (std::byte& b : body_) {
       b = static_cast<std::byte>((noise_ = noise_ * 6364136223846793005u + 1442695040888963407u) >> 56);
     }
-    recorder->Receive({TopicId::kTissueFrame, {1}, ++sent_, 0, now_ns, kHead, body_}, [] { return true; });
+    recorder->Receive({TopicId::kTissueFrame, {1}, ++sent_, 0, now_ns, kHead, body_});
   }
   [[nodiscard]] std::uint64_t sent() const { return sent_; }
 
