@@ -137,16 +137,16 @@ TEST(Live, ReadersGetTheRecordedMessagesAsOfNow) {
 }
 
 /// A recording of some samples without content. It is removed with the object.
-class Samples {
+class MadeRecording {
  public:
   static constexpr std::int64_t kFirst_ns = 5'000'000'000'000;
 
-  explicit Samples(const std::string& name)
+  explicit MadeRecording(const std::string& name)
       : file_(std::filesystem::temp_directory_path() / ("fulcrum_live_" + name + std::to_string(::getpid()))),
         writer_(file_, "", "test") {}
-  ~Samples() { std::filesystem::remove(file_); }
-  Samples(const Samples&) = delete;
-  Samples& operator=(const Samples&) = delete;
+  ~MadeRecording() { std::filesystem::remove(file_); }
+  MadeRecording(const MadeRecording&) = delete;
+  MadeRecording& operator=(const MadeRecording&) = delete;
 
   /// @param time_s after the first message. @param epoch_s start of the process, after the first message as well.
   template <class T>
@@ -191,13 +191,13 @@ class LiveSamples : public ::testing::Test {
 
 TEST_F(LiveSamples, AreAcceptedAfterThoseOfANodeThatStartedAMomentAgo) {
   // Two processes of haptics, which had run for 100 s when the recording began: it is a dump, for example.
-  Samples samples("epochs");
+  MadeRecording samples("epochs");
   std::uint64_t sequence = 0;
   for (int ms = 0; ms < 900; ms += 10) samples.Write(ToolState(), 5000 + ++sequence, 1e-3 * ms, -100);
   for (int ms = 900; ms < 1200; ms += 10) samples.Write(ToolState(), ++sequence, 1e-3 * ms, 0.899);
   TickManifest tick;
   tick.node = NodeId::kPhysics;
-  tick.consumed = {{TopicId::kToolState, static_cast<std::uint64_t>(Samples::At(0.899)), sequence}};
+  tick.consumed = {{TopicId::kToolState, static_cast<std::uint64_t>(MadeRecording::At(0.899)), sequence}};
   samples.Write(tick, 1, 1.2, -90);
 
   bus::DdsParticipant participant({.domain = kDomain, .node_name = "test", .shared_memory = {}});
@@ -239,7 +239,7 @@ TEST_F(LiveSamples, AreAcceptedAfterThoseOfANodeThatStartedAMomentAgo) {
 }
 
 TEST_F(LiveSamples, BeforeTheStartAreThoseOfALateJoinerOnly) {
-  Samples samples("past");
+  MadeRecording samples("past");
   CauteryContact contact;
   TissueFrame frame;
   for (std::uint64_t i = 1; i <= 100; ++i) {
