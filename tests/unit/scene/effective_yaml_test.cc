@@ -139,7 +139,10 @@ TEST_F(Effective, TheMeshesOfABasesToolAreThoseOfItsKind) {
   std::ofstream(folder_ / "low.yaml")
       << "name: low\nbase: small\ntools: {tool0: {meshes: {body: grasper.stl, jaws: [jaw.stl, jaw.stl]}}}\n";
   const auto body = [&](const std::string& tool) {
-    return Read("name: x\nbase: low.yaml\ntools: {tool0: " + tool + "}\n").settings.tool_meshes[0].body_file.filename();
+    // The hook of the base is another tool's: a scene has one.
+    const SceneDescription scene =
+        Read("name: x\nbase: low.yaml\ntools: {tool0: " + tool + ", tool1: {kind: grasper}}\n");
+    return scene.settings.tool_meshes[0].body_file.filename();
   };
   EXPECT_EQ(body("{shaft_radius_mm: 3}"), "grasper.stl");
   EXPECT_EQ(body("{kind: grasper}"), "grasper.stl") << "no other kind";
