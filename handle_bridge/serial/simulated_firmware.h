@@ -53,7 +53,7 @@ class SimulatedFirmware {
   /// Input at a CLOCK_MONOTONIC time [ns]; no value: not known yet, so nothing is sent.
   using InputAt = std::function<std::optional<SimulatedInput>(std::int64_t)>;
 
-  /// For units that nobody touches: their lines are sent in bursts, as an adapter with a buffer delivers them.
+  /// While the input does not change, lines are sent in bursts, as an adapter with a buffer delivers them.
   struct Rest {
     /// Time until which the input stays as it is at this one [CLOCK_MONOTONIC, ns]; null: unknown.
     std::function<std::int64_t(std::int64_t)> until;

@@ -23,7 +23,7 @@ class DomainGuard {
 
   /// The process that holds the domain; empty also when that cannot be asked (see Connect).
   [[nodiscard]] static std::optional<control::Caller> Holder(int domain);
-  /// True when a supervisor runs in the domain, whoever runs it.
+  /// True when a supervisor of any user runs in the domain.
   [[nodiscard]] static bool IsTaken(int domain);
   /// True when a supervisor of this user runs in the domain, or one of which the user is not known.
   [[nodiscard]] static bool IsHeld(int domain);

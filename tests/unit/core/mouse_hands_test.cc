@@ -150,7 +150,7 @@ TEST_F(MouseHandsTest, WhoTakesThemFindsTheJawsAsTheyAre) {
   hands_.Press(HandsKey::kTool2, true);
   hands_.Press(HandsKey::kJawLock, true);
   hands_.Release();
-  // As the picture shows them, whoever has closed them.
+  // The angles that the picture shows, from any source.
   view.closed = {true, false, true};
   hands_.SetView(view);
   hands_.Take(6 * kMs);

@@ -91,7 +91,7 @@ void RawReader::Take(fast::DataReader* reader) {
   while (reader->take_next_sample(&payload_, &info) == ReturnCode::RETCODE_OK) {
     if (!info.valid_data || payload_.size() < kEncapsulation_B) continue;
     RawSample sample = Describe(info);
-    // In a loan nobody has written it.
+    // The writer of a loan leaves its encapsulation unset.
     sample.head = large ? std::span<const std::byte>(kEncapsulation) : std::span(payload_).first(kEncapsulation_B);
     sample.body = std::span(payload_).subspan(kEncapsulation_B);
     if (check_->IsForeign(SessionOf(sample.body))) continue;
