@@ -47,7 +47,7 @@ class VesselSupply {
   [[nodiscard]] bool CutOff(const Vec2f& material, const Atlas& atlas);
 
   /// visit(material) for the texels [m] of the vessels beside clips that are cut off. Visits each such vessel within
-  /// kSupply_m of a clip: milliseconds.
+  /// kSupply_m of a clip.
   void ForEachCutOff(const Atlas& atlas, const std::function<void(const Vec2f& material)>& visit);
 
  private:
