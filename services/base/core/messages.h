@@ -470,7 +470,7 @@ struct Health {
   TimingSummary wake;               ///< Lateness of the wake-up, since the start.
   std::string last_error;           ///< At most 255 characters; empty if there is no error.
   std::vector<InputHealth> inputs;  ///< At most 16.
-  std::vector<Metric> metrics;      ///< At most 24.
+  std::vector<Metric> metrics;      ///< At most 28.
 };
 
 }  // namespace fulcrum
