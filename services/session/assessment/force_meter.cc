@@ -13,6 +13,8 @@ constexpr double kHeldAgain = 0.9;
 /// When jaws open, the grip force falls below this share of its previous value from one message to the next; the noise
 /// of a handle is a third of that step.
 constexpr float kSteadyGrip = 0.985f;
+/// Longest time in which a restarted physics_node publishes contacts before it has restored its grasps [s].
+constexpr double kRestored_s = 0.5;
 
 const Contact* GraspOf(const DeviceContacts& contacts) {
   const auto end = contacts.contacts.begin() + std::min<std::uint32_t>(contacts.count, kMaxContacts);
@@ -31,7 +33,7 @@ ForceMeter::ForceMeter(const AssessmentParams& params, const PhysicsParams& phys
 ForceMeter::Finding ForceMeter::Add(double time_s, const ContactModel& model) {
   Finding finding;
   if (time_s <= last_s_) return finding;
-  // A restarted physics_node restores its grasp from its checkpoint, which is no slip.
+  // A restarted physics_node restores its grasp from its checkpoint, which is no slip and no new hold.
   const bool continues = model.stamp.epoch == epoch_ && time_s - last_s_ <= kGap_s;
   epoch_ = model.stamp.epoch;
   const double dt_s = continues ? time_s - last_s_ : 0;
@@ -43,21 +45,25 @@ ForceMeter::Finding ForceMeter::Add(double time_s, const ContactModel& model) {
     tool.force_N = force_N;
     tool.peak_N = std::max(tool.peak_N, force_N);
     finding.too_high |= force_N > static_cast<double>(params_.limit[static_cast<std::size_t>(Measure::kPeakForce)]);
-    if (!continues) holds_[i] = {};
-    finding.slips |= FollowHold(model.devices[i], force_N, dt_s, &holds_[i], &tool);
+    if (Hold& hold = holds_[i]; !continues && hold.holding) {
+      hold = {.holding = true, .begin_z = hold.begin_z, .held_s = hold.held_s, .kept_until_s = time_s + kRestored_s};
+    }
+    finding.slips |= FollowHold(model.devices[i], force_N, time_s, dt_s, &holds_[i], &tool);
   }
   return finding;
 }
 
-bool ForceMeter::FollowHold(const DeviceContacts& contacts, double force_N, double dt_s, Hold* hold,
+bool ForceMeter::FollowHold(const DeviceContacts& contacts, double force_N, double time_s, double dt_s, Hold* hold,
                             ToolForce* tool) const {
   const Contact* grasp = GraspOf(contacts);
   if (grasp == nullptr) {
+    if (time_s < hold->kept_until_s) return false;
     const bool lost = hold->holding && hold->closed && !hold->slipping;
     *hold = {};
     tool->slips += lost ? 1 : 0;
     return lost;
   }
+  hold->kept_until_s = -1;
   if (!hold->holding) {
     hold->holding = true;
     hold->begin_z = grasp->x_ref.z();

@@ -38,10 +38,12 @@ class ForceMeter {
     float grip_N = 0;       ///< Grip force in the last message.
     bool slipping = false;  ///< The traction exceeds the grip force.
     float begin_z = 0;
-    double held_s = 0;  ///< Present uninterrupted time at the demanded lift.
+    double held_s = 0;         ///< Present uninterrupted time at the demanded lift.
+    double kept_until_s = -1;  ///< After a break: until this time a message without a grasp does not end the hold.
   };
   /// Updates a hold; true when a slip begins.
-  bool FollowHold(const DeviceContacts& contacts, double force_N, double dt_s, Hold* hold, ToolForce* tool) const;
+  bool FollowHold(const DeviceContacts& contacts, double force_N, double time_s, double dt_s, Hold* hold,
+                  ToolForce* tool) const;
 
   AssessmentParams params_;
   float closed_grip_N_;

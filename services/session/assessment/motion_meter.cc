@@ -15,6 +15,9 @@ constexpr int kSlowSamples = 10;
 /// A longer movement is split here, which bounds memory and the size of the transform.
 constexpr std::size_t kLongestMovement = 3000;
 constexpr std::size_t kShortestMovement = 10;
+/// A tool has returned after a restart of haptics_node when its tip is this near to its last place before [m], at the
+/// latest after this time [s]: 0.6 m/s (operated) or 0.5 s (Touch) over any way within reach, and a margin.
+constexpr double kReturned_m = 0.002, kReturn_s = 1.5;
 
 }  // namespace
 
@@ -51,8 +54,13 @@ void MotionMeter::Add(double time_s, const ToolState& state) {
     tools_[i].present |= present;
   }
   if (last_s_ && !(time_s > *last_s_)) return;
-  if (last_s_ && time_s - *last_s_ > kGap_s) {
-    Finish();
+  const bool restarted = last_s_ && state.stamp.epoch != epoch_;
+  if (restarted || (last_s_ && time_s - *last_s_ > kGap_s)) Finish();
+  if (restarted) Restart(time_s);
+  epoch_ = state.stamp.epoch;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    Return& back = returns_[i];
+    if (time_s >= back.until_s || (tips[i] - back.place).norm() < kReturned_m) back.until_s = -1;
   }
   if (last_s_) {
     for (double k = std::floor(*last_s_ * kGridRate_Hz) + 1; k / kGridRate_Hz <= time_s; ++k) {
@@ -74,10 +82,18 @@ void MotionMeter::Finish() {
   last_s_.reset();
 }
 
+void MotionMeter::Restart(double time_s) {
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    if (!tools_[i].present) continue;
+    if (returns_[i].until_s < 0) returns_[i].place = last_tips_[i];
+    returns_[i].until_s = time_s + kReturn_s;
+  }
+}
+
 void MotionMeter::Step(double time_s, const std::array<Vec3d, kMaxTools>& tips) {
   bool any = false, all_rest = true;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
-    if (!tools_[i].present) continue;
+    if (!tools_[i].present || returns_[i].until_s >= 0) continue;
     const Vec3d tip = tracks_[i].filter.Filter(tips[i]);
     const double step_m = (tip - tracks_[i].last.value_or(tip)).norm();
     tracks_[i].last = tip;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -69,6 +70,13 @@ class MotionMeter {
     bool is_movement = false;     ///< The profile has exceeded the movement speed.
     int slow = 0;                 ///< Number of slow samples at the end of the profile.
   };
+  /// The way of a tool from its resting place back to the hand, after a restart of haptics_node.
+  struct Return {
+    double until_s = -1;          ///< Session time at which it ends at the latest [s]; negative: none.
+    Vec3d place = Vec3d::Zero();  ///< Of the tip in the last message before the restart [m], W.
+  };
+  /// Begins the return of all present tools.
+  void Restart(double time_s);
   void Step(double time_s, const std::array<Vec3d, kMaxTools>& tips);
   void Follow(double time_s, double speed, Track* track, ToolMotion* tool) const;
   static void Close(Track* track, ToolMotion* tool);
@@ -76,7 +84,9 @@ class MotionMeter {
   AssessmentParams params_;
   std::array<Track, kMaxTools> tracks_;
   std::array<ToolMotion, kMaxTools> tools_;
+  std::array<Return, kMaxTools> returns_;
   IdleClock idle_;
+  std::uint64_t epoch_ = 0;       ///< Of the newest ToolState's writer.
   std::optional<double> last_s_;  ///< Session time of the newest ToolState.
   std::array<Vec3d, kMaxTools> last_tips_{};
 };

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -132,6 +133,66 @@ TEST(MotionMeter, ADriftIsNoMovement) {
   meter.Finish();
   EXPECT_EQ(meter.tool(0).movements, 0);
   EXPECT_EQ(meter.tool(0).smoothness_count, 0);
+}
+
+/// A tool that rests 60 mm from the start of its script. At 3 s the writer is silent for `silence_s`; then another one
+/// moves the tool from the start to its place with 0.6 m/s.
+ToolMotion MotionOfARestart(const AssessmentParams& params, double silence_s, double rests_at_m) {
+  MotionMeter meter(params);
+  for (int i = 0; i < 8000; ++i) {
+    const double time_s = 1e-3 * i;
+    if (time_s > 3 && time_s < 3 + silence_s) continue;
+    const bool again = time_s > 3;
+    const double way_m = again ? std::min(rests_at_m, 0.6 * (time_s - 3 - silence_s)) : 0.06;
+    ToolState state = test::ToolAt(time_s, Vec3d(way_m, 0, 0), Vec3d::Zero());
+    state.stamp.epoch = again ? 2 : 1;
+    // 20 mm and back, long after the return.
+    if (time_s > 6)
+      state.tools[0].p_WT.x() += 0.01f * static_cast<float>(1 - std::cos(std::numbers::pi * (time_s - 6)));
+    meter.Add(time_s, state);
+  }
+  meter.Finish();
+  return meter.tool(0);
+}
+
+TEST(MotionMeter, TheWayBackAfterARestartOfHapticsIsNotCounted) {
+  const test::AssessedScene scene;
+  // A process that is back within a gap's time, and one that needs longer.
+  for (const double silence_s : {0.05, 0.5}) {
+    const ToolMotion motion = MotionOfARestart(scene.view.assessment, silence_s, 0.06);
+    EXPECT_NEAR(1e3 * motion.path_m, 40, 1) << silence_s;
+    EXPECT_EQ(motion.movements, 1) << silence_s;
+    EXPECT_GT(motion.first_s, 5.9) << silence_s;
+  }
+  // A hand that is elsewhere now: it is measured again after 1.5 s.
+  EXPECT_NEAR(1e3 * MotionOfARestart(scene.view.assessment, 0.5, 0.05).path_m, 40, 1);
+}
+
+/// The longest time held [s] of a lift of 8 mm in 1 s, then a pull of 2 N up to 10 s; the next physics_node begins at
+/// 3.5 s after a silence of 40 ms, without a grasp in its first messages.
+double HeldOverARestart(std::uint64_t next_epoch, int messages_without_grasp) {
+  test::AssessedScene scene;
+  scene.view.assessment.limit[static_cast<std::size_t>(Measure::kLift)] = 6;
+  scene.view.assessment.limit[static_cast<std::size_t>(Measure::kPeakForce)] = 3.5f;
+  ForceMeter meter(scene.view.assessment, scene.view.physics);
+  for (int i = 0; i < 1000; ++i) {
+    if (next_epoch != 1 && i >= 346 && i < 350) continue;
+    const double lift_m = 0.008 * std::clamp(0.01 * i - 1, 0.0, 1.0);
+    ContactModel model = test::GraspAt(0.01 * i, Vec3d(0, 0, lift_m), 2, 8);
+    model.stamp.epoch = i < 350 ? 1 : next_epoch;
+    if (i >= 350 && i < 350 + messages_without_grasp) model.devices[0].count = 0;
+    EXPECT_FALSE(meter.Add(0.01 * i, model).slips);
+  }
+  EXPECT_NEAR(meter.tool(0).lift_m, 0.008, 1e-6);
+  return meter.tool(0).lift_hold_s;
+}
+
+TEST(ForceMeter, AHoldGoesOnAfterARestartOfPhysics) {
+  EXPECT_NEAR(HeldOverARestart(1, 0), 8.24, 0.03);
+  EXPECT_NEAR(HeldOverARestart(2, 0), 8.2, 0.05);
+  EXPECT_NEAR(HeldOverARestart(2, 5), 8.15, 0.05);
+  // A grasp that is not restored within 0.5 s is another hold: its lift begins where the tip is then.
+  EXPECT_LT(HeldOverARestart(2, 60), 2);
 }
 
 TEST(ForceMeter, ASilenceOrAnotherPhysicsNodeIsNotCounted) {
