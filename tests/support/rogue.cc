@@ -117,9 +117,9 @@ fast::DataWriter* MakeWriter(fast::DomainParticipant* participant, fast::Publish
 }  // namespace
 
 struct Rogue::Impl {
-  explicit Impl(int domain_id)
-      : domain(domain_id),
-        participant(WriterOf(domain_id, "rogue")),
+  explicit Impl(const bus::DdsSettings& settings)
+      : bus(settings),
+        participant(settings),
         epoch(static_cast<std::uint64_t>(runtime::MonotonicNs())),
         stamper(static_cast<std::int64_t>(epoch)) {}
 
@@ -172,13 +172,14 @@ struct Rogue::Impl {
     return sent;
   }
 
-  const int domain;
+  const bus::DdsSettings bus;
   bus::DdsParticipant participant;
   const std::uint64_t epoch;
   bus::Stamper stamper;
 };
 
-Rogue::Rogue(int domain) : impl_(std::make_unique<Impl>(domain)) {}
+Rogue::Rogue(int domain) : Rogue(WriterOf(domain, "rogue")) {}
+Rogue::Rogue(const bus::DdsSettings& settings) : impl_(std::make_unique<Impl>(settings)) {}
 Rogue::~Rogue() = default;
 
 std::uint64_t Rogue::epoch() const { return impl_->epoch; }
@@ -197,9 +198,9 @@ std::uint64_t Rogue::Pour(Flood what, double seconds, std::uint32_t seed) {
 std::uint64_t Rogue::PourBytes(int per_topic, std::uint32_t seed) {
   std::mt19937 random(seed);
   fast::DomainParticipantQos qos;
-  const bus::Security security = WriterOf(impl_->domain).security;
+  const bus::Security& security = impl_->bus.security;
   const auto gate = security.on() ? bus::dds::ApplySecurity(security, &qos) : nullptr;
-  fast::DomainParticipant* participant = Join(impl_->domain, qos);
+  fast::DomainParticipant* participant = Join(impl_->bus.domain, qos);
   if (gate) gate->Open();
   if (participant == nullptr) return 0;
   fast::Publisher* publisher = participant->create_publisher(fast::PUBLISHER_QOS_DEFAULT);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "services/base/core/messages.h"
+#include "services/transport/bus/dds/participant.h"
 #include "services/transport/bus/security.h"
 
 namespace fulcrum::testing {
@@ -27,7 +28,10 @@ enum class Flood {
 
 class Rogue {
  public:
+  /// Waits for the session of a cart in that domain (WriterOf).
   explicit Rogue(int domain);
+  /// A bus without a cart.
+  explicit Rogue(const bus::DdsSettings& settings);
   ~Rogue();
   Rogue(const Rogue&) = delete;
   Rogue& operator=(const Rogue&) = delete;

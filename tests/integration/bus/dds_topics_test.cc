@@ -115,7 +115,8 @@ TEST(DdsInput, WhatWritersAndReadersShareIsLockedByUs) {
 TEST(DdsInput, BytesThatAreNoMessageAreRefusedAndHoldNothingUp) {
   Pair<ContactModel> models;
   Pair<Health> healths;
-  EXPECT_GT(fulcrum::testing::Rogue(kDomain).PourBytes(30, 1), 0u);
+  fulcrum::testing::Rogue rogue({.domain = kDomain, .node_name = "rogue", .shared_memory = {}});
+  EXPECT_GT(rogue.PourBytes(30, 1), 0u);
   ASSERT_TRUE(models.out->Write(test::Sample<ContactModel>()));
   ASSERT_TRUE(healths.out->Write(test::Sample<Health>()));
   ContactModel model;
