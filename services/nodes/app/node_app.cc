@@ -26,6 +26,7 @@
 #include "services/nodes/app/health_report.h"
 #include "services/nodes/app/longest_end.h"
 #include "services/nodes/app/node_confinement.h"
+#include "services/nodes/app/physics_rate.h"
 #include "services/nodes/app/recorder_wait.h"
 #include "services/transport/bus/dds/shared_memory.h"
 #include "services/transport/bus/input_account.h"
@@ -300,6 +301,7 @@ NodeApp::NodeApp(NodeId node, const NodeOptions& options) {
     throw InputError("--session " + options.session.string() + ": no such folder");
   }
   impl_ = std::make_unique<Impl>(node, options);
+  if (node == NodeId::kPhysics) CheckPhysicsRate(scene(), cart());
 }
 NodeApp::~NodeApp() = default;
 

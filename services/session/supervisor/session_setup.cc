@@ -5,6 +5,7 @@
 #include "services/base/config/operation.h"
 #include "services/base/core/error.h"
 #include "services/nodes/app/cart_security.h"
+#include "services/nodes/app/physics_rate.h"
 #include "services/records/recording/free_name.h"
 #include "services/session/supervisor/outcome.h"
 #include "services/session/supervisor/session_keys.h"
@@ -16,7 +17,11 @@ namespace {
 
 bool HasRecorder(const UpSettings& settings) { return settings.record || settings.keep_s > 0; }
 
+/// Throws InputError where the cart cannot run the scene.
 std::vector<NodeId> NodesOf(const SceneView& scene, const UpSettings& settings) {
+  if ((scene.node_mask >> static_cast<unsigned>(NodeId::kPhysics) & 1u) != 0) {
+    app::CheckPhysicsRate(scene, settings.cart);
+  }
   std::vector<NodeId> nodes;
   for (int i = 0; i < kNodeCount; ++i) {
     const auto id = static_cast<NodeId>(i);

@@ -10,6 +10,7 @@
 #include "services/nodes/app/health_report.h"
 #include "services/nodes/app/node_app.h"
 #include "services/nodes/app/node_confinement.h"
+#include "services/nodes/app/physics_rate.h"
 
 namespace fulcrum::app {
 namespace {
@@ -67,6 +68,31 @@ TEST(NodeOptionsTest, RefusesWhatCannotWork) {
 TEST(NodeOptionsTest, HelpAndVersionNeedNothingElse) {
   EXPECT_NE(Parse({"--help"}).answer.find("--session"), std::string::npos);
   EXPECT_EQ(Parse({"--version"}).answer.find("physics_node "), 0u);
+}
+
+TEST(PhysicsRateTest, IsThatOfTheScenesSteps) {
+  SceneView scene;
+  config::CartConfig cart;
+  EXPECT_NO_THROW(CheckPhysicsRate(scene, cart));
+  scene.physics.dt_s = 0.02f;
+  try {
+    CheckPhysicsRate(scene, cart);
+    FAIL() << "the tissue would run at twice its speed";
+  } catch (const InputError& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("physics.dt_ms is 20,"), std::string::npos) << text;
+    EXPECT_NE(text.find("physics_node at 100 Hz"), std::string::npos) << text;
+    EXPECT_NE(text.find("physics.dt_ms to 10 "), std::string::npos) << text;
+    EXPECT_NE(text.find("nodes.physics_node.rate_Hz to 50 "), std::string::npos) << text;
+  }
+  double& rate_Hz = cart.nodes[static_cast<std::size_t>(NodeId::kPhysics)].rate_Hz;
+  rate_Hz = 50;
+  EXPECT_NO_THROW(CheckPhysicsRate(scene, cart));
+  scene.physics.dt_s = 0.003f;
+  rate_Hz = 333.3;
+  EXPECT_NO_THROW(CheckPhysicsRate(scene, cart)) << "a rate in four digits";
+  rate_Hz = 330;
+  EXPECT_THROW(CheckPhysicsRate(scene, cart), InputError);
 }
 
 TEST(NodeConfinementTest, DrawsWithAGpuOfAnyNumber) {
