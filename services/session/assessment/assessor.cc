@@ -31,8 +31,8 @@ Assessor::Assessor(const SceneView& scene)
       force_(scene.assessment, scene.physics),
       line_(scene),
       scope_(scene),
-      damage_(line_.line(), static_cast<double>(scene.assessment.margin_m),
-              static_cast<double>(scene.membrane.texel_m)) {
+      damage_(line_.line(), static_cast<double>(scene.assessment.margin_m), static_cast<double>(scene.membrane.texel_m),
+              PlaceOfFirstSheet(scene)) {
   prompt_until_s_.fill(-1);
 }
 

@@ -25,8 +25,8 @@ static_assert(kCoagulated >= 128 && kDamageByte == 1 && kPatchTexels % kBlock ==
 
 }  // namespace
 
-DamageMap::DamageMap(const SheetLine& line, double margin_m, double texel_m)
-    : line_(line), margin_m_(margin_m), texel_m_(texel_m) {}
+DamageMap::DamageMap(const SheetLine& line, double margin_m, double texel_m, const Eigen::AlignedBox2d& place)
+    : line_(line), margin_m_(margin_m), texel_m_(texel_m), place_(place) {}
 
 void DamageMap::Add(const TemperaturePatch& patch) {
   constexpr std::size_t kEdge = kPatchTexels;
@@ -46,9 +46,9 @@ void DamageMap::Add(const TemperaturePatch& patch) {
       }
       if (row[kTexelBytes * x] < kCoagulated || TestBit(damaged_, first + x)) continue;
       SetBit(damaged_, first + x);
-      const Eigen::Vector2d at(static_cast<double>(patch.header.origin_x + x) + 0.5,
-                               static_cast<double>(patch.header.origin_y + y) + 0.5);
-      beyond_ += line_.Nearest(texel_m_ * at).distance_m > margin_m_ ? 1 : 0;
+      const Eigen::Vector2d at = texel_m_ * Eigen::Vector2d(static_cast<double>(patch.header.origin_x + x) + 0.5,
+                                                            static_cast<double>(patch.header.origin_y + y) + 0.5);
+      beyond_ += place_.contains(at) && line_.Nearest(at).distance_m > margin_m_ ? 1 : 0;
     }
   }
 }

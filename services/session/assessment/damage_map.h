@@ -13,7 +13,8 @@ namespace fulcrum::assessment {
 class DamageMap {
  public:
   /// `line` must outlive this.
-  DamageMap(const SheetLine& line, double margin_m, double texel_m);
+  /// @param place of the sheet of the line, PlaceOfFirstSheet(): damage elsewhere in the atlas does not count.
+  DamageMap(const SheetLine& line, double margin_m, double texel_m, const Eigen::AlignedBox2d& place = WholeAtlas());
 
   void Add(const TemperaturePatch& patch);
   [[nodiscard]] double beyond_margin_m2() const;
@@ -21,6 +22,7 @@ class DamageMap {
  private:
   const SheetLine& line_;
   double margin_m_, texel_m_;
+  Eigen::AlignedBox2d place_;
   std::vector<std::uint8_t> damaged_;  ///< One bit per texel of the atlas; empty until the first patch.
   std::uint64_t beyond_ = 0;
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "services/base/core/messages.h"
 #include "services/session/assessment/gap.h"
 
 namespace fulcrum::assessment {
@@ -39,7 +40,22 @@ LinePlace SheetLine::Nearest(const Eigen::Vector2d& p) const {
   return best;
 }
 
-LineMeter::LineMeter(const SceneView& scene) : params_(scene.assessment), line_(scene.planned_line) {
+Eigen::AlignedBox2d PlaceOfFirstSheet(const SheetScene& scene) {
+  if (scene.sheets.size() < 2) return WholeAtlas();
+  const SheetPart& sheet = scene.sheets.front();
+  const double patch_m = kPatchTexels * static_cast<double>(scene.membrane.texel_m);
+  Eigen::AlignedBox2d place;
+  for (std::uint32_t row = sheet.first_row; row < sheet.first_row + sheet.rows; ++row) {
+    for (std::uint32_t col = 0; col < sheet.cols; ++col) {
+      const Vec2f& at = scene.membrane_material[std::size_t{row} * scene.membrane.cols + col];
+      place.extend((at.cast<double>() / patch_m).array().floor().matrix());
+    }
+  }
+  return {patch_m * place.min(), patch_m * (place.max() + Eigen::Vector2d::Ones())};
+}
+
+LineMeter::LineMeter(const SceneView& scene)
+    : params_(scene.assessment), line_(scene.planned_line), place_(PlaceOfFirstSheet(scene)) {
   for (const ProtectedStructure& structure : scene.protected_structures) {
     std::vector<Vec2f> course;
     for (const ProtectedPoint& point : scene.protected_points.subspan(structure.first_point, structure.point_count)) {
@@ -65,11 +81,11 @@ LineMeter::Finding LineMeter::Add(const HookSample& contact) {
   } else {
     dry_s_ = 0;
   }
-  if (!contact.touching) {
+  const Eigen::Vector2d at = contact.material.cast<double>();
+  if (!contact.touching || !place_.contains(at)) {
     last_.reset();
     return finding;
   }
-  const Eigen::Vector2d at = contact.material.cast<double>();
   if (energised) {
     for (const Spared& spared : spared_) {
       const bool near = spared.line.Nearest(at).distance_m < spared.reach_m;

@@ -2,8 +2,11 @@
 // with the pedal down.
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <vector>
+
+#include <Eigen/Geometry>
 
 #include "services/base/core/scene_view.h"
 
@@ -28,6 +31,15 @@ class SheetLine {
   std::vector<Eigen::Vector2d> points_;
   std::vector<double> along_;  ///< Arc length at each point [m].
 };
+
+[[nodiscard]] inline Eigen::AlignedBox2d WholeAtlas() {
+  const Eigen::Vector2d far = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
+  return {-far, far};
+}
+
+/// Place in the atlas [m] of the first sheet, on which planned line and protected structures lie: its box, in whole
+/// patches. WholeAtlas() in a scene that has no other sheet.
+[[nodiscard]] Eigen::AlignedBox2d PlaceOfFirstSheet(const SheetScene& scene);
 
 /// Place of a CauteryContact, and whether a pedal was down at its time.
 struct HookSample {
@@ -67,6 +79,7 @@ class LineMeter {
 
   AssessmentParams params_;
   SheetLine line_;
+  Eigen::AlignedBox2d place_;  ///< Of the first sheet: nothing is measured elsewhere.
   std::vector<Spared> spared_;
   std::vector<std::uint8_t> done_;  ///< Whether each piece of length kBin of the line was traced.
   std::optional<Eigen::Vector2d> last_;

@@ -15,11 +15,23 @@ constexpr double kPeriod_s = 0.02;
 /// [m]: about three times that between nodes.
 constexpr float kMeets_m = 0.005f;
 
+/// By node of the grid: 1 where it belongs to the first sheet, on which the planned line is.
+std::vector<std::uint8_t> NodesOfFirstSheet(const SheetScene& scene) {
+  std::vector<std::uint8_t> of(scene.membrane.node_count(), 0);
+  const std::vector<SheetPart> sheets = SheetsOf(scene);
+  if (sheets.empty()) return of;
+  for (std::uint32_t row = sheets[0].first_row; row < sheets[0].first_row + sheets[0].rows; ++row) {
+    const std::size_t first = std::size_t{row} * scene.membrane.cols;
+    std::fill_n(of.begin() + static_cast<std::ptrdiff_t>(first), sheets[0].cols, std::uint8_t{1});
+  }
+  return of;
+}
+
 }  // namespace
 
 ScopeMeter::ScopeMeter(const SceneView& scene)
     : scene_(scene),
-      absent_(AbsentNodes(scene)),
+      of_line_(NodesOfFirstSheet(scene)),
       scope_(FindTool(scene.tools, ToolKind::kScope)),
       acting_(FindTool(scene.tools, ToolKind::kHook)),
       line_(scene),
@@ -61,7 +73,7 @@ HookSample ScopeMeter::MiddleOf(double time_s, const Vec3f& eye, const Vec3f& fo
   Vec2f sum = Vec2f::Zero();
   const auto nodes = scene_.rest_position.subspan(scene_.membrane.first, scene_.membrane.node_count());
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    if (absent_[i] != 0) continue;
+    if (of_line_[i] == 0) continue;
     const Vec3f way = nodes[i] - eye;
     const float off = (way - way.dot(forward) * forward).norm();
     if (off >= kMeets_m || way.dot(forward) <= 0) continue;

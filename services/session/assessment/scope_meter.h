@@ -38,7 +38,7 @@ class ScopeMeter {
   [[nodiscard]] HookSample MiddleOf(double time_s, const Vec3f& eye, const Vec3f& forward) const;
 
   SceneView scene_;
-  std::vector<std::uint8_t> absent_;           ///< By node of the grid.
+  std::vector<std::uint8_t> of_line_;          ///< By node of the grid: it belongs to the sheet of the line.
   std::optional<std::size_t> scope_, acting_;  ///< Tools.
   LineMeter line_;
   Lens lens_;

@@ -239,6 +239,67 @@ TEST(Assessment, WithoutALineNothingIsSaidOfIt) {
                            [](const ScoreItem& item) { return item.measure == Measure::kDeviationMean; }));
 }
 
+/// AssessedScene with two sheets of 3 x 3 nodes, 12 mm apart: the fold lies above the membrane and in the atlas three
+/// patches beside it. The membrane's middle is the middle of the planned line.
+struct FoldScene : test::AssessedScene {
+  FoldScene() {
+    constexpr std::uint32_t kRows = 19, kCols = 3, kFold = 16;
+    for (std::uint32_t row = 0; row < kRows; ++row) {
+      for (std::uint32_t col = 0; col < kCols; ++col) {
+        const bool fold = row >= kFold;
+        const float x = 0.02f * static_cast<float>(col), y = 0.02f * static_cast<float>(fold ? row - kFold : row);
+        nodes.emplace_back(x - 0.02f, y - 0.02f, fold ? 0.012f : 0.0f);
+        material.emplace_back(fold ? x + 0.0768f : x, y + 0.02f);
+      }
+    }
+    view.membrane.rows = kRows;
+    view.membrane.cols = kCols;
+    view.rest_position = nodes;
+    view.membrane_material = material;
+    view.sheets = sheets;
+    view.tools[2].kind = ToolKind::kScope;
+    view.render.scope_angle_deg = 0;
+  }
+  std::vector<SheetPart> sheets{{"membrane", 0, 3, 3, kNoIndex}, {"fold", 16, 3, 3, kNoIndex}};
+  std::vector<Vec3f> nodes;
+  std::vector<Vec2f> material;
+};
+
+TEST(Assessment, WorkOnAnotherSheetIsNotMeasuredAgainstTheLine) {
+  const FoldScene scene;
+  Assessor assessor(scene.view);
+  assessor.Begin(test::kStart_ns);
+  for (int i = 0; i < 100; ++i) {
+    AddTip(1 + 0.01 * i, Vec2f(0.09f, 0.03f + 1e-4f * static_cast<float>(i)), true, CauteryMode::kCoag, &assessor);
+  }
+  assessor.Add(PatchAt(1.5, 768, 0, [](const Eigen::Vector2d&) { return true; }));
+  assessor.Finish();
+  EXPECT_TRUE(std::isnan(ValueOf(assessor, Measure::kDeviationMax)));
+  EXPECT_EQ(ValueOf(assessor, Measure::kDamageBeyondMargin), 0);
+  EXPECT_EQ(ValueOf(assessor, Measure::kPedalWithoutContact), 0) << "it is a contact";
+  EXPECT_EQ(assessor.PromptsAt(2), 0u) << "neither off the line nor near the ureter";
+  AddTip(3, Vec2f(0.02f, 0.04f), true, CauteryMode::kCut, &assessor);
+  AddTip(3.01, Vec2f(0.02f, 0.041f), true, CauteryMode::kCut, &assessor);
+  assessor.Finish();
+  EXPECT_NEAR(ValueOf(assessor, Measure::kDeviationMax), 0, 1e-4) << "the membrane is measured";
+}
+
+TEST(Assessment, TheMiddleOfThePictureIsOnTheSheetOfTheLine) {
+  FoldScene scene;
+  scene.view.assessment.tracing = LineTracing::kView;
+  Assessor assessor(scene.view);
+  assessor.Begin(test::kStart_ns);
+  for (int i = 0; i < 100; ++i) {
+    ToolState state = ToolAt(0.03 * i, Vec3d::Zero(), Vec3d::Zero());
+    state.tools[2].kind = ToolKind::kScope;
+    state.tools[2].p_WT = Vec3f(0, 1e-5f * static_cast<float>(i), 0.1f);  // Above the middle of both sheets.
+    state.tools[2].q_WT = Quatf::FromTwoVectors(Vec3f::UnitZ(), -state.tools[2].p_WT);
+    assessor.Add(state);
+  }
+  assessor.Finish();
+  EXPECT_LT(ValueOf(assessor, Measure::kDeviationMax), 0.1) << "the fold's node is 77 mm away in the atlas";
+}
+
 // --------------------------------------------------------------------------------------------------- prompts
 
 TEST(Prompts, SayWhatIsWrongWhileItIs) {
