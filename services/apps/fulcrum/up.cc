@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 
 #include "services/apps/fulcrum/commands.h"
@@ -199,6 +200,13 @@ ExitCode Up(const Words& words) {
     }
   }
   if (values.count("trainee") != 0) {
+    const auto person = [](const config::DeviceConfig& device) {
+      return device.kind == config::DeviceKind::kTouch || device.kind == config::DeviceKind::kOperator;
+    };
+    if (values.count("hands") == 0 && std::ranges::none_of(settings.cart.devices, person)) {
+      throw InputError("--trainee: this cart has no Touch, so the scene's script would operate, and its score be " +
+                       settings.trainee + "'s; add --hands mouse or browser (--hands script to store it all the same)");
+    }
     settings.trainee = values["trainee"].as<std::string>();
     CheckTraineeName(settings.trainee);
     settings.training_database = DatabaseOf(arguments);

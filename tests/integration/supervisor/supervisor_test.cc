@@ -421,14 +421,14 @@ TEST_F(SupervisorTest, AssessedSessionIsScoredAndRemembered) {
     runtime::ChildProcess up = Up(words);
     return Wait(&up).exit_code;
   };
-  EXPECT_EQ(end_of({"--seconds", "1", "--trainee", "Ann", "--database", database}), 2);
+  EXPECT_EQ(end_of({"--seconds", "1", "--hands", "script", "--trainee", "Ann", "--database", database}), 2);
   EXPECT_NE(Log().find("no section `assessment`"), std::string::npos) << Log();
   EXPECT_FALSE(fs::exists(database));
 
   scene::SceneData data = TinyScene(1u << static_cast<unsigned>(NodeId::kPhysics));
   data.fixed.assessment.on = 1;
   scene::WriteSceneFile(data, "name: tiny\n", scene_);
-  runtime::ChildProcess up = Up({"--seconds", "120", "--trainee", "Ann", "--database", database});
+  runtime::ChildProcess up = Up({"--seconds", "120", "--hands", "script", "--trainee", "Ann", "--database", database});
   const Motion motion = PublishMotion(&up);
   EXPECT_EQ(motion.end.exit_code, 0) << Log();
   EXPECT_NE(Log().find("! force too high · score "), std::string::npos) << Log();
@@ -459,7 +459,7 @@ TEST_F(SupervisorTest, AssessedSessionIsScoredAndRemembered) {
   EXPECT_NE(ReadAll(folder_ / "trainee.log").find("Ann: 1 session"), std::string::npos);
 
   std::ofstream(database) << std::string(9000, 'x');
-  EXPECT_EQ(end_of({"--seconds", "1", "--trainee", "Ann", "--database", database}), 2);
+  EXPECT_EQ(end_of({"--seconds", "1", "--hands", "script", "--trainee", "Ann", "--database", database}), 2);
   EXPECT_NE(Log().find("is not a database of trainees, or damaged"), std::string::npos) << Log();
   EXPECT_EQ(ReadAll(database), std::string(9000, 'x'));
 }
@@ -471,6 +471,7 @@ TEST_F(SupervisorTest, BadUseSaysWhatIsWrong) {
       {{"up", scene_.string(), "--seconds", "-1"}, "--seconds"},
       {{"up", scene_.string(), "--sekonds", "1"}, "sekonds"},
       {{"up", scene_.string(), "--database", "x"}, "--database goes with --trainee"},
+      {{"up", scene_.string(), "--trainee", "Ann"}, "the scene's script would operate"},
       {{"restart"}, "NODE is missing"},
       {{"jump"}, "unknown command"},
   };

@@ -207,7 +207,7 @@ async function byTouch({address, newPage}) {
 try {
   // Three others, who have attempted the exercise for a second each.
   for (const name of ['Berthold', 'Cyprian', 'Dietrich']) {
-    execFileSync(fulcrum, ['up', kScene, '--seconds', '1', '--domain', String(kDomain), '--trainee', name, '--out', join(state, 'others')], {stdio: 'pipe'});
+    execFileSync(fulcrum, ['up', kScene, '--seconds', '1', '--domain', String(kDomain), '--hands', 'script', '--trainee', name, '--out', join(state, 'others')], {stdio: 'pipe'});
   }
   await withConsole(fulcrum, browser, kDomain, async use => {
     await byKeyboard(use);
