@@ -55,18 +55,10 @@ TEST_F(ClipsScene, BleedsWithoutClips) {
   EXPECT_GT(outcome.shed_m3, 1e-9);
 }
 
-// Either side of the cut bleeds by itself if only the other one is closed.
+// The vessel comes from the left and ends 3.5 mm to the right of the cut: the first clip closes its supply.
 TEST_F(ClipsScene, BleedsWithTheFirstClipMissing) {
   std::erase_if(settings_.script,
                 [](const auto& key) { return key.tool == kApplier && key.time_s > kAside_s && key.time_s < 6.9; });
-  const auto outcome = Run();
-  EXPECT_EQ(outcome.clips, 1u);
-  EXPECT_GT(outcome.cuts, 0u);
-  EXPECT_GT(outcome.shed_m3, 1e-9);
-}
-
-TEST_F(ClipsScene, BleedsWithTheSecondClipMissing) {
-  std::erase_if(settings_.script, [](const auto& key) { return key.tool == kApplier && key.time_s > 7.1; });
   const auto outcome = Run();
   EXPECT_EQ(outcome.clips, 1u);
   EXPECT_GT(outcome.cuts, 0u);
