@@ -29,17 +29,21 @@ class PackageScripts : public ::testing::Test {
     folder_ = name;
     fs::create_directories(folder_ / "run/systemd/system");
     fs::create_directories(folder_ / "bin");
+    SetState("inactive");
     for (const char* program :
          {"deb-systemd-invoke", "udevadm", "runuser", "systemd-sysusers", "systemd-tmpfiles", "systemctl"}) {
       std::ofstream(folder_ / "bin" / program)
-          << "#!/bin/sh\necho " << program << " \"$@\" >>" << Calls().string() << "\n[ \"$1\" != is-active ] || [ -e "
-          << folder_.string() << "/console-runs ]\n";
+          << "#!/bin/sh\necho " << program << " \"$@\" >>" << Calls().string() << "\n[ \"$1\" != is-active ] || { cat "
+          << State().string() << "; grep -qx active " << State().string() << "; }\n";
       fs::permissions(folder_ / "bin" / program, fs::perms::owner_all);
     }
   }
   ~PackageScripts() override { fs::remove_all(folder_); }
 
   fs::path Calls() const { return folder_ / "calls"; }
+  fs::path State() const { return folder_ / "state"; }
+  /// What systemctl says of each unit.
+  void SetState(const std::string& state) const { std::ofstream(State()) << state << "\n"; }
   /// Runs a script whose /run is a folder of this test; returns the calls that it makes.
   std::string Run(const std::string& script, const std::string& argument) {
     const std::string text = std::regex_replace(ReadFile(kDeploy / "packaging" / script), std::regex(" /(run|proc)/"),
@@ -58,7 +62,7 @@ class PackageScripts : public ::testing::Test {
 TEST_F(PackageScripts, AnUpgradeStartsTheConsoleAgainIfItRan) {
   const std::string start = "deb-systemd-invoke start fulcrum-console.service";
   EXPECT_EQ(Run("postinst", "configure").find(start), std::string::npos) << "not by the first installation";
-  std::ofstream(folder_ / "console-runs") << "yes";
+  SetState("active");
   EXPECT_NE(Run("prerm", "upgrade").find("deb-systemd-invoke stop"), std::string::npos);
   EXPECT_NE(Run("postinst", "configure").find(start), std::string::npos);
   EXPECT_EQ(Run("postinst", "configure").find(start), std::string::npos) << "once";
@@ -66,9 +70,21 @@ TEST_F(PackageScripts, AnUpgradeStartsTheConsoleAgainIfItRan) {
   EXPECT_NE(Run("postinst", "abort-upgrade").find(start), std::string::npos);
   (void)Run("prerm", "remove");
   EXPECT_EQ(Run("postinst", "configure").find(start), std::string::npos);
-  fs::remove(folder_ / "console-runs");
+  SetState("inactive");
   (void)Run("prerm", "upgrade");
   EXPECT_EQ(Run("postinst", "configure").find(start), std::string::npos) << "it did not run";
+}
+
+// The host of an older release than the cart's ends, and waits for its next start when it is upgraded.
+TEST_F(PackageScripts, AnUpgradeStartsAHostAgainThatTheOldReleaseCouldNotKeepRunning) {
+  const std::string start = "deb-systemd-invoke start fulcrum-host.service";
+  for (const char* state : {"failed", "activating"}) {
+    SetState(state);
+    (void)Run("prerm", "upgrade");
+    const std::string calls = Run("postinst", "configure");
+    EXPECT_NE(calls.find(start), std::string::npos) << state;
+    EXPECT_LT(calls.find("systemctl reset-failed fulcrum-host.service"), calls.find(start)) << state;
+  }
 }
 
 TEST_F(PackageScripts, RulesAreAppliedToEveryDeviceThatIsPluggedInAlready) {
