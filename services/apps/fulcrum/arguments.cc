@@ -5,11 +5,14 @@
 #include <cstdio>
 #include <cstdlib>
 #include <iostream>
+#include <optional>
 
 #include "services/apps/fulcrum/commands.h"
 #include "services/base/config/cart.h"
+#include "services/base/config/strict_yaml.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/install_places.h"
+#include "services/transport/link/options.h"
 
 namespace fulcrum::supervisor::cli {
 namespace po = boost::program_options;
@@ -67,6 +70,26 @@ int DomainOf(const Arguments& arguments) {
   if (arguments.values.count("domain") != 0) return DomainOf(arguments, 0);
   const std::filesystem::path cart = CartOf(arguments);
   return cart.empty() ? config::DefaultDomain() : config::LoadCart(cart).domain;
+}
+
+void AddLinkDomain(po::options_description* options) {
+  options->add_options()(
+      "link-domain", po::value<int>()->value_name("N"),
+      ("DDS domain between the hosts, 101 to 200, the same on both (default: 100 more than the domain that --domain or "
+       "the cart file gives, else " +
+       std::to_string(link::kUsualLinkDomain) + ")")
+          .c_str());
+}
+
+int LinkDomainOf(const Arguments& arguments) {
+  std::optional<int> domain;
+  if (arguments.values.count("domain") != 0) {
+    domain = DomainOf(arguments, 0);
+  } else if (const std::filesystem::path cart = CartOf(arguments); !cart.empty()) {
+    if (config::StrictYaml::FromFile(cart).root().Has("domain")) domain = config::LoadCart(cart).domain;
+  }
+  return link::LinkDomain(arguments.values.count("link-domain") != 0 ? arguments.values["link-domain"].as<int>() : 0,
+                          domain);
 }
 
 void AddCart(po::options_description* options) {

@@ -73,6 +73,12 @@ void AddDomain(boost::program_options::options_description* options);
 /// the same options runs. Throws InputError when it is out of range or the cart file has a fault.
 [[nodiscard]] int DomainOf(const Arguments& arguments);
 
+/// Adds --link-domain.
+void AddLinkDomain(boost::program_options::options_description* options);
+/// Domain of the link to another host: the value of --link-domain, else of the domain that --domain or the cart file
+/// (CartOf) gives, else the usual one. Throws InputError when the cart file has a fault.
+[[nodiscard]] int LinkDomainOf(const Arguments& arguments);
+
 /// Adds --cart.
 void AddCart(boost::program_options::options_description* options);
 /// Value of --cart, else the cart file of this machine if it has one; empty: all hardware is simulated.

@@ -17,8 +17,6 @@ ExitCode Host(const Words& words) {
       ("nodes", po::value<std::string>()->value_name("NODE,..."), "nodes that a cart may run here (default: all)")(
           "address", po::value<std::string>()->value_name("ADDR"),
           "own address on the network of the cart (default: that of the interface to --peer)")(
-          "link-domain", po::value<int>()->value_name("N"),
-          "DDS domain between the hosts, 101 to 200, the same on both (default: 100 more than --domain)")(
           "out", po::value<std::string>()->value_name("DIR")->default_value("out"), "folder for the session folders")(
           "cache", po::value<std::string>()->value_name("DIR"),
           "folder of received scenes, named by their hash (default: received, in the cache of compiled scenes)")(
@@ -31,6 +29,7 @@ ExitCode Host(const Words& words) {
           "quality of the picture: auto, low, high");
   AddCart(&options);
   AddDomain(&options);
+  AddLinkDomain(&options);
   const Arguments arguments = Parse("host", words, options);
   if (arguments.help) {
     return ExitCode::kDone;
@@ -42,8 +41,7 @@ ExitCode Host(const Words& words) {
   const auto text = [&](const char* name) { return values.count(name) != 0 ? values[name].as<std::string>() : ""; };
   HostSettings settings;
   settings.domain = DomainOf(arguments);
-  settings.far = link::FarSettingsFor(bus::FarSide::kHost, text("peer"), text("address"), settings.domain,
-                                      values.count("link-domain") != 0 ? values["link-domain"].as<int>() : 0);
+  settings.far = link::FarSettingsFor(bus::FarSide::kHost, text("peer"), text("address"), LinkDomainOf(arguments));
   if (values.count("nodes") != 0) {
     settings.allowed = link::NodesFromNames(text("nodes"));
   }

@@ -91,8 +91,6 @@ ExitCode Up(const Words& words) {
           "insecure-link", "no keys on the link to --peer, for a closed bench; also give it to fulcrum host")(
           "address", po::value<std::string>()->value_name("ADDR"),
           "own address on the network of the peer (default: that of the interface to --peer)")(
-          "link-domain", po::value<int>()->value_name("N"),
-          "DDS domain between the hosts, 101 to 200, the same on both (default: 100 more than --domain)")(
           "standby", "run a second physics_node that takes over when the first is silent")(
           "open-bus",
           "make no keys for this session: every process of this machine can read and write its topics (default: the "
@@ -107,6 +105,7 @@ ExitCode Up(const Words& words) {
   AddDatabase(&options);
   AddCart(&options);
   AddDomain(&options);
+  AddLinkDomain(&options);
   const Arguments arguments = Parse("up", words, options, {"scene"});
   if (arguments.help) {
     return ExitCode::kDone;
@@ -157,10 +156,9 @@ ExitCode Up(const Words& words) {
     settings.peer = values["peer"].as<std::string>();
     settings.remote = link::NodesFromNames(values["remote"].as<std::string>());
     settings.address = values.count("address") != 0 ? values["address"].as<std::string>() : "";
-    settings.link_domain = values.count("link-domain") != 0 ? values["link-domain"].as<int>() : 0;
+    settings.link_domain = LinkDomainOf(arguments);
     // Invalid addresses are refused here, before any node is started.
-    (void)link::FarSettingsFor(bus::FarSide::kCart, settings.peer, settings.address, settings.cart.domain,
-                               settings.link_domain);
+    (void)link::FarSettingsFor(bus::FarSide::kCart, settings.peer, settings.address, settings.link_domain);
     settings.link_keys = link::KeysOfLink(values.count("keys") != 0 ? values["keys"].as<std::string>() : "",
                                           settings.cart.security.keys, values.count("insecure-link") != 0);
     if (settings.standby && (settings.remote >> static_cast<unsigned>(NodeId::kPhysics) & 1u) != 0) {
@@ -200,6 +198,8 @@ ExitCode Up(const Words& words) {
     }
   }
   if (values.count("trainee") != 0) {
+    settings.trainee = values["trainee"].as<std::string>();
+    CheckTraineeName(settings.trainee);
     const auto person = [](const config::DeviceConfig& device) {
       return device.kind == config::DeviceKind::kTouch || device.kind == config::DeviceKind::kOperator;
     };
@@ -207,8 +207,6 @@ ExitCode Up(const Words& words) {
       throw InputError("--trainee: this cart has no Touch, so the scene's script would operate, and its score be " +
                        settings.trainee + "'s; add --hands mouse or browser (--hands script to store it all the same)");
     }
-    settings.trainee = values["trainee"].as<std::string>();
-    CheckTraineeName(settings.trainee);
     settings.training_database = DatabaseOf(arguments);
   } else if (values.count("database") != 0) {
     throw InputError("--database goes with --trainee NAME; give both");
@@ -232,7 +230,14 @@ ExitCode Up(const Words& words) {
     if (!expected.empty()) std::printf("%s\n", expected.c_str());
     std::fflush(stdout);
   }
-  if (on_page) {
+  if (on_page && !renders_here) {
+    // No picture crosses the link, and the page gives the controls only where it shows one.
+    std::printf(
+        "the tools wait for you: open the page of fulcrum console on %s, where the picture is drawn, and take "
+        "the controls; the page of this machine shows no picture\n",
+        settings.peer.c_str());
+    std::fflush(stdout);
+  } else if (on_page) {
     std::printf("the tools wait for you: open the page of fulcrum console --domain %d and take the controls\n",
                 settings.cart.domain);
     std::fflush(stdout);

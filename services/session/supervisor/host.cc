@@ -43,7 +43,8 @@ class Host {
 
   ExitCode Run() {
     if (settings_.far.keys.empty()) progress_.Say(std::string("! ") + link::kInsecureLink);
-    progress_.Say("waiting for the cart at " + settings_.far.peer + ", as " + settings_.far.address);
+    progress_.Say("waiting for the cart at " + settings_.far.peer + ", as " + settings_.far.address +
+                  ", in link domain " + std::to_string(settings_.far.domain));
     if (!WaitForSession() || !WaitForScene()) return ExitCode::kDone;
     Begin();
     while (!runtime::ShouldStop() && !failed_ && !IsOver()) Turn();

@@ -20,7 +20,7 @@ struct HostSettings {
   std::filesystem::path out;             ///< Folder in which the session folder is made.
   std::filesystem::path programs;        ///< Folder of the node programs.
   std::filesystem::path cache;           ///< Folder of received scenes, named by their hash.
-  /// Cart file of this host: its handles, pedal and devices replace those of the session's cart.
+  /// Cart file of this host: services/session/supervisor/offered_cart.h says which of its keys count.
   std::optional<config::CartConfig> cart;
   std::string quality = "auto";  ///< Quality of the picture: auto, low, high.
   bool window = false;

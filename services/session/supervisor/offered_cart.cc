@@ -43,6 +43,22 @@ std::vector<LocalKey> LocalKeysOf(config::CartConfig* cart) {
   return keys;
 }
 
+/// Replaces the lines and devices that nodes of this host open by its own. An operator's input stays: it belongs to the
+/// session, whatever hardware a machine has.
+void UseOwnHardware(const config::CartConfig& own, std::uint32_t nodes, config::CartConfig* cart) {
+  const auto runs = [nodes](NodeId node) { return (nodes >> static_cast<unsigned>(node) & 1u) != 0; };
+  if (runs(NodeId::kHandleBridge)) {
+    for (std::size_t tool = 0; tool < cart->handles.size(); ++tool) {
+      if (cart->handles[tool].kind != config::LinkKind::kOperator) cart->handles[tool] = own.handles[tool];
+    }
+    if (cart->pedal.kind != config::LinkKind::kOperator) cart->pedal = own.pedal;
+  }
+  if (!runs(NodeId::kHaptics)) return;
+  for (std::size_t tool = 0; tool < cart->devices.size(); ++tool) {
+    if (cart->devices[tool].kind != config::DeviceKind::kOperator) cart->devices[tool] = own.devices[tool];
+  }
+}
+
 constexpr const char* kWhatToDo =
     "; start fulcrum host with --cart FILE, whose handles, pedal and devices are those of the host";
 
@@ -69,9 +85,8 @@ config::CartConfig CartOnHost(const link::Offer& offer, const std::string& from,
   }
   cart.security.encrypt = own && own->security.encrypt;
   if (own) {
-    cart.handles = own->handles;
-    cart.pedal = own->pedal;
-    cart.devices = own->devices;
+    for (const LocalKey& local : LocalKeysOf(&cart)) local.reset();
+    UseOwnHardware(*own, offer.nodes, &cart);
     return cart;
   }
   if (const std::vector<LocalKey> local = LocalKeysOf(&cart); !local.empty()) {

@@ -22,8 +22,9 @@ struct OfferedCart {
 
 /// The cart with which a host runs the nodes of an offer.
 /// @param from the other host, for messages. @param own the host's own cart file: its handles, pedal and devices
-/// replace those of the offer, and its `security.encrypt` counts. Without it an offer that names a file or a device, or
-/// withholds one, is refused. Throws InputError naming the key.
+/// replace those of the offer for the nodes that run here, except where an operator's input moves them, and its
+/// `security.encrypt` counts. Without it an offer that names a file or a device, or withholds one, is refused. Throws
+/// InputError naming the key.
 [[nodiscard]] config::CartConfig CartOnHost(const link::Offer& offer, const std::string& from,
                                             const std::optional<config::CartConfig>& own);
 

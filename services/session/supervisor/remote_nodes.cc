@@ -15,7 +15,7 @@ namespace fulcrum::supervisor {
 namespace {
 
 bus::FarSettings FarOf(const UpSettings& up) {
-  bus::FarSettings far = link::FarSettingsFor(bus::FarSide::kCart, up.peer, up.address, up.cart.domain, up.link_domain);
+  bus::FarSettings far = link::FarSettingsFor(bus::FarSide::kCart, up.peer, up.address, up.link_domain);
   far.keys = up.link_keys;
   return far;
 }

@@ -90,7 +90,8 @@ void Judge(const SessionSetup& setup, const SessionNodes& nodes, const SessionRe
   for (const NodeId node : setup.remote_ids) {
     if (!record.node(node).seen) {
       fail(std::string(NodeName(node)) + " on " + setup.settings.peer +
-           " never reported; does `fulcrum host` run there, with this machine as its --peer?");
+           " never reported; does `fulcrum host` run there, with this machine as its --peer, in link domain " +
+           std::to_string(setup.settings.link_domain) + "?");
     }
   }
   const ScriptDemands demands =

@@ -31,7 +31,7 @@ struct UpSettings {
   std::uint32_t remote = 0;
   std::string peer, address;
   std::filesystem::path link_keys;          ///< Folder of the link's keys; empty: an insecure link.
-  int link_domain = 0;                      ///< Domain of the link; 0: the default one of the cart's domain.
+  int link_domain = 0;                      ///< Domain of the link, 101 to 200.
   std::string trainee;                      ///< Name under which the score is stored; empty: it is not stored.
   std::filesystem::path training_database;  ///< File of the scores; services/session/supervisor/training_log.h.
   bool open_bus = false;                    ///< No keys: every process of this machine can join the bus.

@@ -21,6 +21,10 @@ using bus::FarLane;
 /// Shortest interval between samples of poses, jaw angles and contacts that are sent to a host that only makes pictures
 /// [ns].
 constexpr std::int64_t kThinned_ns = 10'000'000;
+/// SceneManifest is published again when the clock offset has moved by this much: all stamps follow the present offset,
+/// so that the session times of the two hosts part by what the start of the session does not follow. Less than the
+/// shortest period of a node, so that the session time of a node never goes back [ns].
+constexpr std::int64_t kStartMoves_ns = 500'000;
 constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 /// Largest message of the bus, except for those that are divided into chunks.
 constexpr std::size_t kLargestSample_B = bus::kOrderedPacket_B;
@@ -303,20 +307,39 @@ class IncomingSamples final : public IncomingBase<T> {
     std::swap(cdr_, next_);
     if (head.base == 0) all_ = false;
     if (!bus::DecodeCdr(std::span<const std::uint8_t>(cdr_), &message_)) return Taken::kBad;
-    return this->Publish(&message_, link);
+    const Taken taken = this->Publish(&message_, link);
+    if constexpr (kNamesSessionStart) {
+      published_ = taken == Taken::kYes;
+      published_offset_ns_ = link->offset_ns;
+    }
+    return taken;
+  }
+  void Follow(LinkContext* link) override {
+    if constexpr (kNamesSessionStart) {
+      if (!published_ || std::abs(link->offset_ns - published_offset_ns_) <= kStartMoves_ns) return;
+      // Converted anew from what was received, of which cdr_ is a copy.
+      published_ = bus::DecodeCdr(std::span<const std::uint8_t>(cdr_), &message_) &&
+                   this->Publish(&message_, link) == Taken::kYes;
+      published_offset_ns_ = link->offset_ns;
+    }
   }
   void Restart() override {
     number_ = 0;
     all_ = false;
+    published_ = false;
   }
   bool TakeAll() override { return all_; }
   [[nodiscard]] std::uint64_t lost() const override { return lost_; }
 
  private:
+  static constexpr bool kNamesSessionStart = std::is_same_v<T, SceneManifest>;
+
   T message_;
   std::vector<std::uint8_t> cdr_, next_;
   std::uint32_t number_ = 0;
   bool all_ = false;
+  bool published_ = false;                ///< kNamesSessionStart only: cdr_ was published,
+  std::int64_t published_offset_ns_ = 0;  ///< with this clock offset.
   std::uint64_t lost_ = 0;
 };
 

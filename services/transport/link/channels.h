@@ -56,6 +56,9 @@ class Incoming {
   [[nodiscard]] virtual Taken Take(std::span<const std::uint8_t> body, LinkContext* link) = 0;
   /// The node that the last foreign sample named.
   [[nodiscard]] virtual NodeId foreigner() const { return NodeId::kSupervisor; }
+  /// Publishes again what names a time of the whole session, if the estimate of the clock offset has moved since: call
+  /// in each cycle.
+  virtual void Follow(LinkContext* /*link*/) {}
   /// Resets the state: the link on the other side has restarted.
   virtual void Restart() = 0;
   /// Whether the topic has a reader on this host now.

@@ -64,14 +64,16 @@ void Link::Connect() {
   }
   far_.reset();
   connected_ns_ = MonotonicNs();
-  if (bus::IsUnplugged(settings_.far.address)) {
-    error_ = "the interface with the address " + settings_.far.address + " is down or has no cable";
+  bus::FarSettings far = settings_.far;
+  // While the cable is disconnected the route can lead to another network.
+  if (far.follows_route) far.address = bus::AddressTowards(far.peer);
+  if (bus::IsUnplugged(far.address)) {
+    error_ = "the interface with the address " + far.address + " is down or has no cable";
     return;
   }
   error_.clear();
   far_ = std::make_unique<bus::FarParticipant>(
-      settings_.far,
-      [this](FarLane lane, std::span<const std::uint8_t> bytes) { inbox_.Put(lane, bytes, MonotonicNs()); });
+      far, [this](FarLane lane, std::span<const std::uint8_t> bytes) { inbox_.Put(lane, bytes, MonotonicNs()); });
   connected_ns_ = MonotonicNs();  // Making a participant with keys can take a while.
 }
 
@@ -118,9 +120,10 @@ LinkStatus Link::status() {
   status.insecure = settings_.far.keys.empty();
   status.refused = refused_.count() + dropped_ + (far_ ? far_->dropped() : 0);
   status.rebuilt = rebuilt_;
-  status.error = !mismatch_.empty()  ? mismatch_
-                 : !error_.empty()   ? error_
-                 : heard_ns_ == 0    ? "the other host " + settings_.far.peer + " has not answered yet"
+  status.error = !mismatch_.empty() ? mismatch_
+                 : !error_.empty()  ? error_
+                 : heard_ns_ == 0   ? "the other host " + settings_.far.peer + " has not answered yet in link domain " +
+                                        std::to_string(settings_.far.domain)
                  : !status.connected ? "the other host " + settings_.far.peer +
                                            " does not answer; check the cable and the link on that host"
                                      : std::string();
@@ -180,6 +183,10 @@ void Link::TakePackets(std::int64_t now) {
   context_.now_ns = now;
   context_.offset_ns = clock_.OffsetAt(now);
   for (const Inbox::Packet& packet : inbox.packets) Take(packet);
+  if (!clock_.known()) return;
+  for (const Channel& channel : channels_) {
+    if (channel.in) channel.in->Follow(&context_);
+  }
 }
 
 bool Link::IsOfSession(const Envelope& envelope) const {
@@ -204,6 +211,7 @@ bool Link::IsOfPeer(std::uint64_t epoch, std::int64_t now) {
   their_epoch_ = epoch;
   clock_ = ClockFilter();
   heard_sent_ns_ = heard_pulse_ns_ = 0;
+  proved_ = proved_ && settings_.far.side == bus::FarSide::kCart;
   wished_ = 0;
   for (Channel& channel : channels_) {
     if (channel.in) channel.in->Restart();
@@ -221,8 +229,7 @@ void Link::Take(const Inbox::Packet& packet) {
     return;
   }
   if (version != kWireVersion) {
-    // Of a side that has already proved to be of this release it is no reason to end the session.
-    if (heard_pulse_ns_ != 0) return refused_.Foreign("packets of version " + std::to_string(version) + " of the link");
+    if (proved_) return refused_.Foreign("packets of version " + std::to_string(version) + " of the link");
     mismatch_ = "link mismatch: the other host uses version " + std::to_string(version) + " of the link, this one " +
                 std::to_string(kWireVersion) + "; use the same release on both hosts";
     return;
@@ -270,12 +277,13 @@ void Link::TakePulse(std::span<const std::uint8_t> body, std::int64_t heard_ns) 
     return;
   }
   if (pulse.schema_hash != bus::SchemaHash()) {
-    if (heard_pulse_ns_ != 0) return refused_.Foreign("pulses with another schema");
+    if (proved_) return refused_.Foreign("pulses with another schema");
     mismatch_ = "schema mismatch: the other host uses other topics; use the same release on both hosts";
     return;
   }
   const bool back = heard_ns_ != 0 && heard_ns - heard_ns_ > kSilence;
   heard_ns_ = heard_pulse_ns_ = heard_ns;
+  proved_ = true;
   attempts_ = 0;
   heard_sent_ns_ = pulse.sent_ns;
   if (pulse.heard_epoch == epoch_ && pulse.heard_sent_ns != 0) {
@@ -295,7 +303,8 @@ void Link::TakePulse(std::span<const std::uint8_t> body, std::int64_t heard_ns) 
     if (id == TopicId::kTissueFrame) out->Repeat(pulse.missing_tissue);
     if (id == TopicId::kTemperaturePatch) out->Repeat(pulse.missing_patches);
   }
-  if (pulse.wants_offer && settings_.offer && allowance_.offers > 0) {
+  // A host that was started while this session ends waits for the next one.
+  if (pulse.wants_offer && settings_.offer && !bye_ && allowance_.offers > 0) {
     --allowance_.offers;
     (void)Send(FarLane::kOrdered, PacketKind::kOffer,
                [this](std::vector<std::uint8_t>* out) { PutOffer(*settings_.offer, out); });

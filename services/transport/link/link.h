@@ -126,6 +126,9 @@ class Link {
   std::uint64_t their_epoch_ = 0;
   std::uint32_t wished_ = 0;  ///< Bit per TopicId, from the last pulse of the other side.
   std::int64_t heard_ns_ = 0, heard_pulse_ns_ = 0, heard_sent_ns_ = 0;
+  /// A pulse of this release was taken: packets of another one are then no reason to end the session. A host forgets it
+  /// when the cart is started again, because that begins another session.
+  bool proved_ = false;
   std::int64_t connected_ns_ = 0;  ///< When the present participant was made.
   int attempts_ = 0;               ///< Participants made since the last packet of the other side.
   std::int64_t next_pulse_ns_ = 0;

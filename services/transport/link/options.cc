@@ -4,7 +4,6 @@
 #include <sstream>
 
 #include "services/base/core/error.h"
-#include "services/transport/bus/access.h"
 #include "services/transport/keys/key_folder.h"
 
 namespace fulcrum::link {
@@ -45,13 +44,19 @@ std::string NamesOfNodes(std::uint32_t nodes) {
   return names;
 }
 
-bus::FarSettings FarSettingsFor(bus::FarSide side, const std::string& peer, const std::string& address, int cart_domain,
+int LinkDomain(int given, std::optional<int> cart_domain) {
+  if (given != 0) return given;
+  return cart_domain ? *cart_domain + kBetweenDomains : kUsualLinkDomain;
+}
+
+bus::FarSettings FarSettingsFor(bus::FarSide side, const std::string& peer, const std::string& address,
                                 int link_domain) {
   bus::FarSettings far;
   far.side = side;
   far.peer = bus::ResolveAddress(peer);
+  far.follows_route = address.empty();
   far.address = address.empty() ? bus::AddressTowards(far.peer) : bus::ResolveAddress(address);
-  far.domain = link_domain != 0 ? link_domain : cart_domain + kBetweenDomains;
+  far.domain = link_domain;
   if (far.domain < bus::kFirstLinkDomain || far.domain > bus::kLastLinkDomain) {
     throw InputError("link domain " + std::to_string(far.domain) + ": must be 101 to 200, the same on both hosts");
   }

@@ -263,6 +263,17 @@ TEST(Link, TheEndOfTheSessionIsHeard) {
   EXPECT_TRUE(Eventually([&] { return hosts.host_link->session().over; }));
 }
 
+TEST(Link, AHostThatIsStartedWhileTheSessionEndsIsNotOfferedItAgain) {
+  TwoHosts hosts(BitOf(NodeId::kRender));
+  hosts.cart_link.SendBye();
+  ASSERT_TRUE(Eventually([&] { return hosts.host_link->session().over; }));
+  hosts.host_link.reset();
+  hosts.host_link = std::make_unique<Link>(LinkSettings{.far = Far(bus::FarSide::kHost), .offer = {}, .scene = {}});
+  ASSERT_TRUE(Eventually([&] { return hosts.host_link->status().known; }));
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));  // The time of ten pulses.
+  EXPECT_EQ(hosts.host_link->session().number, 0u);
+}
+
 TEST(SceneTransfer, ComesWholeWhateverGetsLostAndDamageShows) {
   const fs::path file = fs::temp_directory_path() / ("link-scene-" + std::to_string(::getpid()));
   std::vector<char> bytes(5 * kSceneChunk_B + 123);

@@ -108,6 +108,7 @@ class Intruder {
     return counts_[static_cast<std::size_t>(kind)];
   }
   [[nodiscard]] std::uint64_t epoch() const { return epoch_; }
+  std::atomic<std::int64_t> ahead_ns{0};  ///< Its clock minus that of the link.
 
  private:
   void OnPacket(std::span<const std::uint8_t> bytes) {
@@ -125,7 +126,7 @@ class Intruder {
     answer.schema_hash = bus::SchemaHash();
     answer.heard_epoch = envelope.epoch;
     answer.heard_sent_ns = pulse.sent_ns;
-    answer.heard_ns = answer.sent_ns = MonotonicNs();
+    answer.heard_ns = answer.sent_ns = MonotonicNs() + ahead_ns;
     Send(PacketKind::kPulse, [&](auto* out) { PutPulse(answer, out); });
   }
 
@@ -335,7 +336,33 @@ TEST(LinkRefusal, AnotherVersionOfThePeerIsNamedAndEndsNothing) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
     return Names(&cart.link, "of the link");
   }));
+  // Also of another schema, when the peer was started again.
+  Pulse pulse;
+  pulse.schema_hash = bus::SchemaHash() + 1;
+  const Envelope restarted{PacketKind::kPulse, cart.intruder.epoch() + 1, SessionKeyOf(SomeOffer().session_id)};
+  EXPECT_TRUE(Eventually([&] {
+    cart.intruder.SendAs(restarted, [&](auto* out) { PutPulse(pulse, out); });
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    return Names(&cart.link, "another schema") || !cart.link.mismatch().empty();
+  }));
   EXPECT_TRUE(cart.link.mismatch().empty()) << cart.link.mismatch();
+}
+
+// Stamps follow the offset of the clocks, and so must the start of the session, from which session times count.
+TEST(LinkClock, TheStartOfTheSessionFollowsTheClockOfTheOtherHost) {
+  Attacked host(FarSide::kHost);
+  const auto manifests = host.local.MakeInput<SceneManifest>();
+  SceneManifest manifest = Sample<SceneManifest>(), got;
+  manifest.session_start_ns = MonotonicNs();
+  ASSERT_TRUE(Eventually([&] {
+    host.intruder.SendSample(manifest);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    return manifests->TakeLatest(&got);
+  }));
+  const std::int64_t expected_ns = got.session_start_ns - 100'000'000;
+  host.intruder.ahead_ns = 100'000'000;
+  EXPECT_TRUE(Eventually(
+      [&] { return manifests->TakeLatest(&got) && std::abs(expected_ns - got.session_start_ns) < 20'000'000; }));
 }
 
 TEST(LinkRefusal, AFloodOfRequestsIsAnsweredAtABoundedRate) {

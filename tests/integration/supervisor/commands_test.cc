@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "services/base/config/cart.h"
 #include "services/session/supervisor/domain_guard.h"
 #include "services/session/supervisor/session_folder.h"
 #include "tests/support/program.h"
@@ -76,6 +77,43 @@ TEST_F(CommandsTest, AHostWaitsInTheDomainOfItsCartFile) {
   }
   EXPECT_TRUE(DomainGuard::IsHeld(kDomain)) << host.Said();
   host.End(SIGTERM);
+}
+
+// Two ends that run as different users have different domains of their own, but must meet.
+TEST_F(CommandsTest, TheLinkDomainDependsOnGivenDomainsAndNotOnTheUser) {
+  const fs::path unnamed = folder_ / "unnamed.yaml";
+  WriteFile(unnamed, "name: bench\n");
+  const int own = config::DefaultDomain();
+  const struct {
+    Words words;
+    int domain;
+    const char* link_domain;
+  } cases[] = {{{"--cart", unnamed.string()}, own, "101"},
+               {{"--cart", cart_.string()}, kDomain, "180"},
+               {{"--cart", unnamed.string(), "--domain", "80"}, kDomain, "180"},
+               {{"--cart", cart_.string(), "--link-domain", "123"}, kDomain, "123"}};
+  for (const auto& [words, domain, link_domain] : cases) {
+    if (DomainGuard::IsHeld(domain)) continue;  // A session of this user runs there.
+    Words all{"host", "--peer", "127.0.0.1", "--address", "127.0.0.1", "--insecure-link", "--out", folder_.string()};
+    all.insert(all.end(), words.begin(), words.end());
+    Program host("fulcrum", all);
+    const std::string expected = std::string("in link domain ") + link_domain + "\n";
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (host.Said().find(expected) == std::string::npos && !host.Poll() && std::chrono::steady_clock::now() < end) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    EXPECT_NE(host.Said().find(expected), std::string::npos) << host.Said();
+    host.End(SIGTERM);
+  }
+}
+
+TEST_F(CommandsTest, HandsInABrowserAreSentToTheMachineThatDrawsThePicture) {
+  const DomainGuard taken(kDomain);  // `up` ends before it starts a node.
+  EXPECT_EQ(Run({"up", "small", "--hands", "browser", "--peer", "127.0.0.1", "--address", "127.0.0.1", "--remote",
+                 "physics_node,render_node", "--insecure-link", "--cart", cart_.string(), "--out", folder_.string()}),
+            2);
+  EXPECT_TRUE(Said("open the page of fulcrum console on 127.0.0.1")) << said_;
+  EXPECT_FALSE(Said("fulcrum console --domain")) << said_;
 }
 
 TEST_F(CommandsTest, OptionsOfTheLinkNeedAPeer) {

@@ -93,6 +93,21 @@ TEST(ClockFilter, CorrectsSmoothlyAndJumpsOnlyFromFarOff) {
   EXPECT_EQ(Follow(&world, &filter, 41, 80, 72), 0);
 }
 
+// CLOCK_MONOTONIC of a suspended machine stands still.
+TEST(ClockFilter, FollowsAtOnceWhenAMachineWasSuspended) {
+  for (const std::int64_t jump_ns : {60 * kSecond, -60 * kSecond, kSecond / 10}) {
+    World world;
+    world.drift = 60e-6;
+    world.jitter_ns = 20e3;
+    ClockFilter filter;
+    EXPECT_LT(Follow(&world, &filter, 0.1, 40, 15), 40e3);
+    world.offset_ns += jump_ns;
+    // A trip during which a machine slept is slow and says little.
+    filter.Add({40 * kSecond, world.Theirs(40 * kSecond), world.Theirs(40 * kSecond) + kMilli, 45 * kSecond});
+    EXPECT_LT(Follow(&world, &filter, 45.1, 80, 45.3), 1e6) << jump_ns;
+  }
+}
+
 TEST(ClockFilter, TripsThatCannotBeAreDisregarded) {
   ClockFilter filter;
   constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max(),

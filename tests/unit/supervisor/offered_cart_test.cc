@@ -31,6 +31,7 @@ link::Offer OfferOf(const OfferedCart& offered) {
   link::Offer offer;
   offer.cart_yaml = config::CartToYaml(offered.cart);
   offer.withheld = offered.withheld;
+  offer.nodes = kDevices;
   return offer;
 }
 
@@ -69,6 +70,36 @@ TEST(OfferedCart, AHostNeedsItsOwnCartForWhatIsWithheld) {
   EXPECT_EQ(cart.handles[0].link.port, "/dev/ttyACM3");
   EXPECT_EQ(cart.devices[1].motion, "/srv/motion.csv");
   EXPECT_EQ(cart.timing(NodeId::kPhysics).rate_Hz, 50) << "the rates come from the session's cart";
+}
+
+TEST(OfferedCart, AnOperatorMovesTheToolsWhateverHardwareTheHostHas) {
+  config::CartConfig operated, own;
+  for (config::DeviceConfig& device : operated.devices) device.kind = config::DeviceKind::kOperator;
+  for (config::HandleConfig& handle : operated.handles) handle.kind = config::LinkKind::kOperator;
+  operated.pedal.kind = config::LinkKind::kOperator;
+  own.devices[0].kind = config::DeviceKind::kTouch;
+  own.pedal.kind = config::LinkKind::kSerial;
+  own.pedal.link.port = "/dev/ttyACM3";
+  link::Offer offer = OfferOf(CartForHost(operated, kDevices));
+  for (const std::uint32_t nodes : {kDevices, BitOf(NodeId::kRender), kDevices | BitOf(NodeId::kRender)}) {
+    offer.nodes = nodes;
+    const config::CartConfig cart = CartOnHost(offer, kFrom, own);
+    EXPECT_TRUE(config::IsOperated(cart));
+    EXPECT_EQ(config::CartToYaml(cart), config::CartToYaml(operated)) << nodes;
+  }
+}
+
+TEST(OfferedCart, AHostUsesItsOwnHardwareOnlyForTheNodesThatRunThere) {
+  config::CartConfig own;
+  own.devices[0].kind = config::DeviceKind::kTouch;
+  own.handles[0].kind = config::LinkKind::kButtons;
+  link::Offer offer = OfferOf(CartForHost(config::CartConfig(), kDevices));
+  for (const bool haptics : {false, true}) {
+    offer.nodes = BitOf(haptics ? NodeId::kHaptics : NodeId::kHandleBridge);
+    const config::CartConfig cart = CartOnHost(offer, kFrom, own);
+    EXPECT_EQ(cart.devices[0].kind == config::DeviceKind::kTouch, haptics);
+    EXPECT_EQ(cart.handles[0].kind == config::LinkKind::kButtons, !haptics);
+  }
 }
 
 TEST(OfferedCart, APathInAReceivedCartIsRefusedWithItsKey) {

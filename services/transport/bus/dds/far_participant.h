@@ -32,6 +32,8 @@ struct FarSettings {
   std::string address;  ///< IPv4 of the interface with the route to the other host: no other is used.
   std::string peer;     ///< IPv4 of the other host: datagrams are exchanged with no other address.
   FarSide side = FarSide::kCart;
+  /// `address` is that of the present route to `peer`: a new participant uses the address of the route at that time.
+  bool follows_route = false;
   /// Folder of `fulcrum keys init`: packets are then encrypted, and only participants with such keys are accepted.
   std::filesystem::path keys = {};
 };

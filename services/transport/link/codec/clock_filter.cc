@@ -14,6 +14,9 @@ constexpr std::int64_t kHeldUp_ns = 200'000;
 /// Over a shorter time the slope of the line is noise and not drift.
 constexpr std::int64_t kShortestLine_ns = 8 * kSecond_ns;
 constexpr std::size_t kFewestForLine = 5;
+/// Two trips whose offsets differ by more than this beyond what their delays and drift allow show that one of the
+/// clocks has jumped, as when its machine was suspended.
+constexpr double kJump_ns = 1e6;
 /// No round trip takes longer: beyond this one of the two clocks has jumped.
 constexpr std::int64_t kLongestTrip_ns = 10 * kSecond_ns;
 
@@ -31,6 +34,12 @@ void ClockFilter::Add(const Trip& trip) {
   const std::int64_t offset = one + minus(two, one) / 2;
   const Best now{trip.t4_ns, offset, delay};
   if (!best_.empty() && trip.t4_ns < best_.back().time_ns) return;
+  // |error of an offset| <= delay / 2. Trips from before a jump say nothing about the present offset.
+  std::erase_if(best_, [&now](const Best& old) {
+    const double possible = 0.5 * static_cast<double>(now.delay_ns + old.delay_ns) +
+                            kLargestDrift * static_cast<double>(now.time_ns - old.time_ns) + kJump_ns;
+    return std::abs(static_cast<double>(now.offset_ns) - static_cast<double>(old.offset_ns)) > possible;
+  });
   if (!best_.empty() && trip.t4_ns / kSecond_ns == best_.back().time_ns / kSecond_ns) {
     if (delay < best_.back().delay_ns) best_.back() = now;
   } else {

@@ -5,7 +5,8 @@
 //   offset = ((t2 - t1) + (t3 - t4)) / 2   theirs minus ours; the error is at most half the difference of the two ways
 //   delay  = (t4 - t1) - (t3 - t2)
 // as in NTP (Mills, RFC 5905). The quickest trip of each second is kept. A line through those trips of the last 30 s
-// that were about as quick as the quickest one gives offset and drift.
+// that were about as quick as the quickest one gives offset and drift. Trips that contradict a newer one are dropped:
+// the clock of one host stands still while that machine is suspended.
 #pragma once
 
 #include <cstdint>
