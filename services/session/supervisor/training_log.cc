@@ -1,10 +1,13 @@
 #include "services/session/supervisor/training_log.h"
 
 #include <sqlite3.h>
+#include <sys/stat.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cstdio>
+#include <fstream>
 
 #include "services/base/core/error.h"
 #include "services/base/runtime/private_file.h"
@@ -29,6 +32,23 @@ CREATE TABLE measures (
 constexpr const char* kPeople = R"sql(
 CREATE TABLE people (name TEXT PRIMARY KEY, pin_hash TEXT NOT NULL, instructor INTEGER NOT NULL) WITHOUT ROWID;
 )sql";
+
+FileContent ContentOf(const std::filesystem::path& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) != 0) return {};
+  return {status.st_dev, status.st_ino, status.st_size,
+          std::int64_t{1'000'000'000} * status.st_mtim.tv_sec + status.st_mtim.tv_nsec};
+}
+
+/// The file's header names this program, as bytes 68 to 71 of SQLite's format.
+bool IsOurs(const std::filesystem::path& file) {
+  std::array<unsigned char, 4> id{};
+  std::ifstream stream(file, std::ios::binary);
+  stream.seekg(68).read(reinterpret_cast<char*>(id.data()), id.size());
+  int application = 0;
+  for (const unsigned char byte : id) application = application << 8 | byte;
+  return stream && application == kApplication;
+}
 
 /// One prepared statement. As in SQLite, indices of parameters begin at 1, those of columns at 0.
 class Statement {
@@ -99,7 +119,8 @@ TrainingRow TrainingRowOf(const SessionOutcome& outcome) {
                   outcome.duration_s,
                   outcome.exit_code == ExitCode::kDone,
                   outcome.sheet->score.percent(),
-                  {}};
+                  {},
+                  0};
   for (const assessment::ScoreItem& item : outcome.sheet->score.items) {
     row.measures.emplace(InfoOf(item.measure).key, item.value);
   }
@@ -112,7 +133,7 @@ TrainingLog::~TrainingLog() = default;
 TrainingLog::TrainingLog(TrainingLog&&) noexcept = default;
 TrainingLog& TrainingLog::operator=(TrainingLog&&) noexcept = default;
 
-TrainingLog::TrainingLog(const std::filesystem::path& file, Access access) : file_(file) {
+TrainingLog::TrainingLog(const std::filesystem::path& file, Access access, FileContent* checked) : file_(file) {
   std::error_code error;
   const bool exists = std::filesystem::exists(file, error);
   if (access != Access::kAdd && !exists) {
@@ -128,11 +149,31 @@ TrainingLog::TrainingLog(const std::filesystem::path& file, Access access) : fil
   // SQLite opens a file without write permission for reading only, without an error.
   if (access != Access::kRead && sqlite3_db_readonly(opened, "main") == 1) Fail("cannot be written to");
   sqlite3_busy_timeout(opened, kBusy_ms);
-  CheckOrMake(access);
+  if (access == Access::kRead) Recover();
+  CheckOrMake(access, checked);
   if (runtime::NarrowToOwner(file)) {
     std::fprintf(stderr, "fulcrum: %s: other users could read it; it is now readable by its owner only\n",
                  file.c_str());
   }
+}
+
+void TrainingLog::Recover() {
+  const auto read = [](sqlite3* database) {
+    return sqlite3_exec(database, "SELECT count(*) FROM sqlite_master", nullptr, nullptr, nullptr);
+  };
+  // A connection that only reads may not roll back; other errors are found by the checks that follow.
+  if (read(database_.get()) == SQLITE_OK || sqlite3_extended_errcode(database_.get()) != SQLITE_READONLY_ROLLBACK) {
+    return;
+  }
+  sqlite3* opened = nullptr;
+  bool good = IsOurs(file_) && sqlite3_open_v2(file_.c_str(), &opened, SQLITE_OPEN_READWRITE, nullptr) == SQLITE_OK;
+  sqlite3_busy_timeout(opened, kBusy_ms);
+  good = good && sqlite3_db_readonly(opened, "main") == 0 && read(opened) == SQLITE_OK;
+  sqlite3_close(opened);
+  if (good) return;
+  throw InputError(file_.string() + ": a crash has left a transaction, which " + file_.filename().string() +
+                   "-journal takes back; keep both files together and open the database once as a user who may write "
+                   "to them, for example with fulcrum trainee");
 }
 
 void TrainingLog::Fail(const std::string& what) const {
@@ -151,7 +192,7 @@ int TrainingLog::Ask(const char* sql) const {
   return static_cast<int>(statement.Integer(0));
 }
 
-void TrainingLog::CheckOrMake(Access access) {
+void TrainingLog::CheckOrMake(Access access, FileContent* checked) {
   const int tables = Ask("SELECT count(*) FROM sqlite_master");
   const int application = Ask("PRAGMA application_id"), version = Ask("PRAGMA user_version");
   const bool empty = tables == 0 && application == 0 && version == 0;
@@ -174,9 +215,12 @@ void TrainingLog::CheckOrMake(Access access) {
   }
   // This program makes none; one made by somebody else would run in place of a table, for ever if it likes.
   if (Ask("SELECT count(*) FROM sqlite_master WHERE type IN ('view', 'trigger')") != 0) Fail("has views or triggers");
-  // Not quick_check, which does not compare the indexes with the tables: a session would be there and not be found.
-  Statement check(database_.get(), "PRAGMA integrity_check(1)");
-  if (!check.Next() || check.Text(0) != "ok") Fail("is damaged");
+  if (const FileContent content = ContentOf(file_); checked == nullptr || *checked != content) {
+    // Not quick_check, which does not compare the indexes with the tables: a session would be there and not be found.
+    Statement check(database_.get(), "PRAGMA integrity_check(1)");
+    if (!check.Next() || check.Text(0) != "ok") Fail("is damaged");
+    if (checked != nullptr) *checked = content;
+  }
   if (!empty && version < kVersion && access != Access::kRead) {
     Execute("BEGIN IMMEDIATE");
     if (!HasPeople()) Execute(kPeople);
@@ -268,7 +312,7 @@ int TrainingLog::Delete(const std::string& trainee) {
 std::vector<TrainingRow> TrainingLog::SessionsOf(const std::string& trainee, const std::string& scene) const {
   Statement sessions(database_.get(),
                      "SELECT id, session, scene, started_utc, seconds, well, score_pct FROM sessions "
-                     "WHERE trainee = ?1 AND (?2 = '' OR scene = ?2) ORDER BY started_utc, id");
+                     "WHERE trainee = ?1 AND (?2 = '' OR scene = ?2) ORDER BY id");
   sessions.Bind(1, trainee);
   sessions.Bind(2, scene);
   Statement measures(database_.get(), "SELECT measure, value FROM measures WHERE session_id = ?");
@@ -281,7 +325,8 @@ std::vector<TrainingRow> TrainingLog::SessionsOf(const std::string& trainee, con
                     sessions.Number(4),
                     sessions.Integer(5) != 0,
                     sessions.Number(6),
-                    {}};
+                    {},
+                    sessions.Integer(0)};
     measures.Bind(1, sessions.Integer(0));
     while (measures.Next()) row.measures.emplace(measures.Text(0), measures.Number(1));
     if (!measures.good()) Fail("cannot be read");
@@ -289,6 +334,26 @@ std::vector<TrainingRow> TrainingLog::SessionsOf(const std::string& trainee, con
     rows.push_back(std::move(row));
   }
   if (!sessions.good()) Fail("cannot be read");
+  return rows;
+}
+
+std::vector<TrainingRow> TrainingLog::RowsOf(const std::string& session) const {
+  Statement found(database_.get(),
+                  "SELECT trainee, scene, started_utc, seconds, well, score_pct, id FROM sessions WHERE session = ?");
+  found.Bind(1, session);
+  std::vector<TrainingRow> rows;
+  while (found.Next()) {
+    rows.push_back({found.Text(0),
+                    session,
+                    found.Text(1),
+                    found.Text(2),
+                    found.Number(3),
+                    found.Integer(4) != 0,
+                    found.Number(5),
+                    {},
+                    found.Integer(6)});
+  }
+  if (!found.good()) Fail("cannot be read");
   return rows;
 }
 
