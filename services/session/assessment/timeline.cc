@@ -33,6 +33,20 @@ const char* NameOf(ToolKind kind) {
   }
 }
 
+/// What an examiner looks for, and clips, which are few.
+bool IsGrave(const Happening& happening) {
+  switch (happening.kind) {
+    case HappeningKind::kForce:
+    case HappeningKind::kSlip:
+    case HappeningKind::kClip:
+      return true;
+    case HappeningKind::kThermal:
+      return happening.thermal >= ThermalEventKind::kUreterWarning;
+    default:
+      return false;
+  }
+}
+
 struct Names {
   const char *key, *text;
 };
@@ -127,10 +141,12 @@ Timeline::Timeline(std::int64_t session_start_ns, const SceneView* scene) : star
 }
 
 std::size_t Timeline::Begin(const Happening& happening) {
-  if (list_.size() == kMost) {
+  const bool grave = IsGrave(happening);
+  if ((grave ? grave_ : list_.size() - grave_) == kMost) {
     ++left_out_;
-    return kMost;
+    return kNotKept;
   }
+  grave_ += grave ? 1 : 0;
   list_.push_back(happening);
   return list_.size() - 1;
 }
@@ -175,9 +191,9 @@ void Timeline::AddForces(double time_s, const ContactModel& model) {
   }
   if (force_->Add(time_s, own).too_high) {
     // Forces that fall below the limit for a moment are one.
-    const bool same = high_force_ < kMost && time_s - list_[high_force_].until_s < kSame_s;
+    const bool same = high_force_ < kNotKept && time_s - list_[high_force_].until_s < kSame_s;
     if (!same) high_force_ = Begin({.time_s = time_s, .until_s = time_s, .kind = HappeningKind::kForce});
-    if (high_force_ < kMost) list_[high_force_].until_s = time_s;
+    if (high_force_ < kNotKept) list_[high_force_].until_s = time_s;
   }
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     if (force_->tool(static_cast<int>(i)).slips == slips[i]) continue;
@@ -207,7 +223,7 @@ void Timeline::Add(const ThermalEvent& event) {
   }
   const std::size_t at =
       Begin({.time_s = time_s, .until_s = time_s, .kind = HappeningKind::kThermal, .thermal = event.kind});
-  if (at < kMost) newest_thermal_[event.kind] = at;
+  if (at < kNotKept) newest_thermal_[event.kind] = at;
 }
 
 void Timeline::Add(const ClipState& state) {

@@ -46,7 +46,8 @@ struct Happening {
 /// Takes each message in the order of its writer. The order between topics does not matter.
 class Timeline {
  public:
-  /// More are counted, but not kept.
+  /// More are counted, but not kept: so many of the grave ones (injuries, warnings, burnt organs, regions reset,
+  /// forces, slips) and of clips together, and so many of all others, which are frequent.
   static constexpr std::size_t kMost = 500;
 
   /// @param session_start_ns CLOCK_MONOTONIC at session time 0 [ns]; earlier messages do not count.
@@ -69,15 +70,18 @@ class Timeline {
   [[nodiscard]] double TimeOf(const Stamp& stamp) const {
     return 1e-9 * static_cast<double>(stamp.stamp_ns - start_ns_);
   }
-  /// Index of the new one; kMost when it is not kept.
+  /// Above all indices of `list_`.
+  static constexpr std::size_t kNotKept = 2 * kMost;
+  /// Index of the new one; kNotKept when it is not kept.
   std::size_t Begin(const Happening& happening);
   void AddForces(double time_s, const ContactModel& model);
 
   std::int64_t start_ns_;
   std::optional<ForceMeter> force_;
   std::array<bool, kMaxTools> assists_{};  ///< The scene holds this tool for the trainee.
-  std::size_t high_force_ = kMost;         ///< Index in `list_` of the newest.
+  std::size_t high_force_ = kNotKept;      ///< Index in `list_` of the newest.
   std::vector<Happening> list_;
+  std::size_t grave_ = 0;  ///< Number of grave ones and clips in `list_`.
   std::size_t left_out_ = 0;
   std::array<ToolKind, kMaxTools> kinds_{};
   std::array<bool, kMaxTools> touched_{}, holds_{};

@@ -109,6 +109,24 @@ TEST(Timeline, AnAssistantIsNotJudged) {
   EXPECT_EQ(told(), "1.0-1.0 touch; 1.0-1.0 grasp; 1.0-1.0 release; 1.0-1.0 touch; ");
 }
 
+TEST(Timeline, WhatIsFrequentLeavesRoomForAnInjury) {
+  Timeline timeline(test::kStart_ns);
+  for (int i = 0; i < 600; ++i) {
+    timeline.Add(test::PedalAt(i, CauteryMode::kCut));
+    timeline.Add(test::PedalAt(i + 0.5, CauteryMode::kOff));
+  }
+  timeline.Add(EventAt(700, ThermalEventKind::kUreterInjury));
+  timeline.Add(EventAt(700.5, ThermalEventKind::kUreterInjury));
+  timeline.Add(EventAt(701, ThermalEventKind::kSteam));
+  ASSERT_EQ(timeline.happenings().size(), Timeline::kMost + 1);
+  EXPECT_EQ(timeline.happenings().back().thermal, ThermalEventKind::kUreterInjury);
+  EXPECT_EQ(timeline.happenings().back().until_s, 700.5);
+  EXPECT_EQ(timeline.left_out(), 101u);
+  // Those are limited as well.
+  for (int i = 0; i < 600; ++i) timeline.Add(EventAt(800 + 2 * i, ThermalEventKind::kNerveWarning));
+  EXPECT_EQ(timeline.happenings().size(), 2 * Timeline::kMost);
+}
+
 TEST(Timeline, ItsLengthIsLimited) {
   Timeline timeline(test::kStart_ns);
   for (std::size_t i = 0; i < Timeline::kMost + 7; ++i) {
