@@ -33,7 +33,6 @@
 #include "services/session/console/session_watch.h"
 #include "services/session/console/training_calls.h"
 #include "services/session/supervisor/ask.h"
-#include "services/session/training/questionnaire.h"
 
 namespace fulcrum::console {
 namespace {
@@ -211,10 +210,10 @@ struct Console::Impl {
       case Wanted::kCancel:
         return LeadTask(routed.wanted);
       case Wanted::kQuestions:
-        return {.body = QuestionsJson(settings.out)};
+        return {.body = QuestionsJson(settings.out, watch.alive() ? std::string() : session)};
       case Wanted::kAnswers:
-        if (session.empty() || watch.alive()) return Refusal(409, "the questionnaire is for a session that has ended");
-        training::WriteAnswers(SessionFile(""), training::ParseAnswers(TextIn(routed.fields, "answers")));
+        StoreAnswers(settings.out, TextIn(routed.fields, "session"), watch.alive() ? session : std::string(),
+                     TextIn(routed.fields, "answers"));
         return Done("Stored. Thank you.");
       case Wanted::kClose:
         if (task && task->running()) return Refusal(409, "the task still runs; wait for its end or cancel it");
@@ -253,8 +252,9 @@ struct Console::Impl {
     order.picture_rate_Hz = MaybeNumberIn(fields, "picture_rate");
     order.hands = fields.contains("hands") && TextIn(fields, "hands") == "on";
     if (fields.contains("trainee")) {
-      order.trainee = TextIn(fields, "trainee") == "expert" ? kExpert : training.person();
-      if (order.trainee.empty()) return Refusal(409, "no trainee has entered; enter with name and PIN first");
+      const bool expert = TextIn(fields, "trainee") == "expert";
+      if (!expert) training.Expect(fields.contains("person") ? TextIn(fields, "person") : std::string());
+      order.trainee = expert ? kExpert : training.person();
     }
     order.record = !fields.contains("record") || TextIn(fields, "record") == "on";
     run.Start(order);
@@ -345,6 +345,7 @@ struct Console::Impl {
     state.run = &run;
     state.task = task.get();
     state.session = session;
+    state.person_changes = training.person_changes();
     state.picture = pictures.Newest();
     std::error_code error;
     state.has_report = !watch.alive() && !session.empty() && fs::is_regular_file(SessionFile("report.html"), error);

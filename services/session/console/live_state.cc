@@ -156,6 +156,7 @@ std::string LiveJson(const LiveState& state, std::uint64_t* cursor) {
   Json json('{');
   json.Text("phase", PhaseOf(state)).Text("session", state.session).Text("picture", state.picture);
   json.Flag("own", state.run->running()).Flag("recording", state.run->recording()).Flag("has_report", state.has_report);
+  json.Number("person_changes", static_cast<double>(state.person_changes), 1);
   if (state.watch->alive()) AddSession(state, &json);
   if (state.run->running() && !state.watch->begun()) json.Text("said", state.run->LastWord());
   if (state.run->end()) {

@@ -25,6 +25,7 @@ struct LiveState {
   const GuidedTask* task = nullptr;  ///< nullptr: no task was started yet.
   std::string session;               ///< Name of the running or last session; empty: none.
   std::string picture;               ///< Name of the newest picture; empty: none.
+  std::uint64_t person_changes = 0;  ///< As of TrainingDesk.
   bool has_report = false;
   Notice notice;
 };

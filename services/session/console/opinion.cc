@@ -2,12 +2,14 @@
 
 #include <vector>
 
+#include "services/base/core/error.h"
+#include "services/session/console/form.h"
 #include "services/session/console/json.h"
 #include "services/session/training/questionnaire.h"
 
 namespace fulcrum::console {
 
-std::string QuestionsJson(const std::filesystem::path& out) {
+std::string QuestionsJson(const std::filesystem::path& out, const std::string& session) {
   std::vector<std::string> refused;  // `fulcrum questionnaire --summary` names them.
   const std::vector<training::Answers> all = training::ReadAllAnswers(out, &refused);
   const auto opinion =
@@ -21,7 +23,22 @@ std::string QuestionsJson(const std::filesystem::path& out) {
     questions.Item(
         one.Number("paper_mean", question.mean, 0.01).Number("paper_deviation", question.deviation, 0.01).Done());
   }
-  return Json('{').Raw("people", std::to_string(all.size())).Raw("questions", questions.Done()).Done();
+  Json json('{');
+  json.Text("session", session).Raw("people", std::to_string(all.size()));
+  return json.Raw("questions", questions.Done()).Done();
+}
+
+void StoreAnswers(const std::filesystem::path& out, const std::string& session, const std::string& running,
+                  const std::string& answers) {
+  const std::filesystem::path folder = out / session;
+  std::error_code error;
+  // A link, such as "latest", may name another session by now.
+  if (!IsPlainName(session) ||
+      std::filesystem::symlink_status(folder, error).type() != std::filesystem::file_type::directory) {
+    throw InputError("no session \"" + session + "\"; its folder may have been removed");
+  }
+  if (session == running) throw InputError("the questionnaire is for a session that has ended");
+  training::WriteAnswers(folder, training::ParseAnswers(answers));
 }
 
 }  // namespace fulcrum::console

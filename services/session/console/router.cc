@@ -51,6 +51,7 @@ constexpr std::array kStartFields{
     Field{"picture_rate", false, IsPictureRate, "0.1 to 30 per second"},
     Field{"hands", false, IsOnOff, "on, off"},
     Field{"trainee", false, IsTrainee, "me, expert"},
+    Field{"person", false, IsShortText, "the name that /api/training returned"},
 };
 constexpr Field kNameField{"name", true, IsShortText, "1 to 63 bytes without control characters"};
 constexpr Field kPinField{"pin", true, IsShortText, "4 to 12 digits"};
@@ -58,6 +59,7 @@ constexpr std::array kAccountFields{kNameField, kPinField};
 constexpr std::array kNewAccountFields{kNameField, kPinField, Field{"instructor", false, IsOnOff, "on, off"}};
 constexpr std::array kAttemptFields{Field{"session", true, IsPlainName, "a session that /api/training lists"}};
 constexpr std::array kAnswersFields{
+    Field{"session", true, IsPlainName, "the session that /api/questionnaire returned"},
     Field{"answers", true, IsShortText, "twelve numbers from 0 to 5 with commas between"}};
 constexpr std::array kNodeFields{Field{"node", true, IsNode, "a node's name, for example physics_node"}};
 constexpr std::array kGeneratorFields{Field{"cut", false, IsKnob, "0 to 300 W"},

@@ -24,7 +24,7 @@ enum class Wanted {
   kSummary,     ///< Figures of the last session.
   kTicket,      ///< A ticket that opens the report of the last session, the live picture or an attempt's, once.
   kStart,       ///< Starts a session. Fields: scene; optional power, seconds, record, picture_rate, hands,
-                ///< trainee (me, expert).
+                ///< trainee (me, expert), person.
   kStop,
   kRestart,  ///< Restarts a node. Field: node.
   kDump,
@@ -40,8 +40,8 @@ enum class Wanted {
   kTrainingLeave,
   kAttempt,        ///< Sheet of an attempt. Field: session.
   kAttemptEvents,  ///< What happened when. Field: session.
-  kQuestions,      ///< The questionnaire and the answers of all sessions.
-  kAnswers,        ///< Stores the answers for the last session. Field: answers.
+  kQuestions,      ///< The questionnaire, the session that it is for, and the answers of all sessions.
+  kAnswers,        ///< Stores the answers for an ended session. Fields: session, answers.
   kClose,          ///< Removes the ended task from the page.
 };
 

@@ -1,6 +1,7 @@
 // The calls of the view Training.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -20,9 +21,12 @@ class TrainingCalls {
 
   /// Name of the person at the cart; empty: none.
   [[nodiscard]] std::string person() const { return desk_.person(); }
+  /// As of TrainingDesk.
+  [[nodiscard]] std::uint64_t person_changes() const { return desk_.person_changes(); }
+  void Expect(const std::string& shown) { desk_.Expect(shown); }
 
   /// As TrainingDesk::FolderOf.
-  [[nodiscard]] std::filesystem::path FolderOf(const std::string& session) const { return desk_.FolderOf(session); }
+  [[nodiscard]] std::filesystem::path FolderOf(const std::string& session) { return desk_.FolderOf(session); }
 
   /// @param scenes folder of the scenes on offer. Throws InputError.
   [[nodiscard]] HttpResponse Answer(const Routed& routed, const std::filesystem::path& scenes);

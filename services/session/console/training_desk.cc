@@ -21,6 +21,8 @@ using supervisor::TrainingRow;
 /// 43,000 guesses a day: a PIN of four digits is no secret from who stands at the cart, but takes hours.
 constexpr std::int64_t kAfterWrongPin = 2 * kSecond_ns;
 constexpr std::size_t kMostAttempts = 500;
+/// A demonstration is complete if it lasted for this share of the longest one: others were stopped by hand.
+constexpr double kComplete = 0.9;
 
 std::string JsonOf(const TrainingRow& row) {
   Json json('{');
@@ -38,30 +40,53 @@ std::string TextOf(const fs::path& file) {
 
 void TrainingDesk::Enter(const std::string& name, const std::string& pin, std::int64_t now_ns) {
   if (now_ns < locked_until_ns_) throw InputError("too soon after a wrong PIN; wait two seconds");
-  std::optional<supervisor::Person> found;
-  std::error_code error;
-  if (fs::exists(database_, error)) found = TrainingLog(database_, TrainingLog::Access::kRead).FindPerson(name);
+  const std::optional<TrainingLog> log = Open();
+  const std::optional<supervisor::Person> found = log ? log->FindPerson(name) : std::nullopt;
   if (!found || !training::IsHashOf(found->pin_hash, pin)) {
     locked_until_ns_ = now_ns + kAfterWrongPin;
     throw InputError("name or PIN is wrong; a new name needs New trainee");
   }
-  person_ = found;
+  Seat(found);
+}
+
+void TrainingDesk::Seat(std::optional<supervisor::Person> person) {
+  person_ = std::move(person);
+  ++person_changes_;
+}
+
+std::optional<TrainingLog> TrainingDesk::Open() {
+  std::optional<TrainingLog> log;
+  std::error_code error;
+  if (fs::exists(database_, error)) log.emplace(database_, TrainingLog::Access::kRead, &checked_);
+  if (person_) {
+    const auto account = log ? log->FindPerson(person_->name) : std::nullopt;
+    if (!account || account->pin_hash != person_->pin_hash) Seat({});
+  }
+  return log;
+}
+
+void TrainingDesk::Expect(const std::string& shown) {
+  (void)Open();
+  if (!person_) throw InputError("no trainee has entered; enter with name and PIN first");
+  if (!shown.empty() && shown != person_->name) throw InputError(person_->name + " is at the cart now");
 }
 
 void TrainingDesk::Create(const std::string& name, const std::string& pin, bool instructor) {
   if (name == kExpert) throw InputError("this name is that of the demonstrations; choose another");
   TrainingLog log(database_);
+  (void)Open();
   if (instructor && log.HasInstructor() && !(person_ && person_->instructor)) {
     throw InputError("there is an instructor already, who must enter first to add another");
   }
   supervisor::Person person{name, training::HashOfPin(pin), instructor};
   log.AddPerson(person);
-  person_ = std::move(person);
+  Seat(std::move(person));
 }
 
-std::string TrainingDesk::OverviewJson(const std::vector<SceneChoice>& scenes) const {
+std::string TrainingDesk::OverviewJson(const std::vector<SceneChoice>& scenes) {
+  const std::optional<TrainingLog> log = Open();
   const bool instructor = person_ && person_->instructor;
-  const TrainingGroup group(person_ ? database_ : fs::path());
+  const TrainingGroup group(person_ && log ? &*log : nullptr);
   const std::vector<training::Course> all = training::ReadCourses(courses_);
   Json courses('[');
   for (const training::Course& course : all) {
@@ -70,7 +95,11 @@ std::string TrainingDesk::OverviewJson(const std::vector<SceneChoice>& scenes) c
       const auto scene = std::ranges::find(scenes, exercise.scene, &SceneChoice::name);
       if (scene == scenes.end()) continue;
       Json scores('[');
-      for (const double score : group.ScoresOf(person(), exercise.scene)) scores.Item(Json::Rounded(score, 0.1));
+      bool passed = false;  // By the exact scores, as in the instructor's table.
+      for (const double score : group.ScoresOf(person(), exercise.scene)) {
+        scores.Item(Json::Rounded(score, 0.001));
+        passed = passed || score >= exercise.pass_pct;
+      }
       Json cohort('[');
       for (const training::Spread& spread : group.CohortOf(exercise.scene, person())) {
         Json one('{');
@@ -79,6 +108,7 @@ std::string TrainingDesk::OverviewJson(const std::vector<SceneChoice>& scenes) c
       }
       Json one('{');
       one.Text("scene", exercise.scene).Text("description", scene->description).Number("pass", exercise.pass_pct, 0.1);
+      one.Flag("passed", passed);
       exercises.Item(one.Raw("scores", scores.Done()).Raw("cohort", cohort.Done()).Done());
     }
     Json one('{');
@@ -91,7 +121,7 @@ std::string TrainingDesk::OverviewJson(const std::vector<SceneChoice>& scenes) c
   for (const auto& [trainee, sessions] : group.sessions()) {
     if (instructor || trainee == person()) std::ranges::copy(sessions, std::back_inserter(attempts));
   }
-  std::ranges::stable_sort(attempts, std::greater<>(), &TrainingRow::started_utc);
+  std::ranges::sort(attempts, std::greater<>(), &TrainingRow::id);
   Json rows('[');
   for (std::size_t i = 0; i < std::min(attempts.size(), kMostAttempts); ++i) rows.Item(JsonOf(attempts[i]));
   Json json('{');
@@ -99,33 +129,49 @@ std::string TrainingDesk::OverviewJson(const std::vector<SceneChoice>& scenes) c
   return json.Raw("attempts", rows.Done()).Raw("group", instructor ? group.TableJson(all) : "[]").Done();
 }
 
-std::string TrainingDesk::Csv() const {
-  const TrainingGroup group(person_ ? database_ : fs::path());
+std::string TrainingDesk::Csv() {
+  const std::optional<TrainingLog> log = Open();
+  const TrainingGroup group(person_ && log ? &*log : nullptr);
   return group.Csv(person_ && person_->instructor ? std::string() : person(), training::ReadCourses(courses_));
 }
 
-fs::path TrainingDesk::FolderOf(const std::string& session) const {
-  std::error_code error;
-  if (!person_ || !IsPlainName(session) || !fs::exists(database_, error)) return {};
-  const TrainingLog log(database_, TrainingLog::Access::kRead);
-  for (const auto& [trainee, sessions] : log.Trainees()) {
-    if (trainee != kExpert && trainee != person_->name && !person_->instructor) continue;
-    const std::vector<TrainingRow> rows = log.SessionsOf(trainee, "");
-    if (std::ranges::find(rows, session, &TrainingRow::session) != rows.end()) return out_ / session;
-  }
-  return {};
+std::optional<TrainingRow> TrainingDesk::Find(const TrainingLog& log, const std::string& session) const {
+  if (!person_ || !IsPlainName(session)) return {};
+  const std::vector<TrainingRow> rows = log.RowsOf(session);
+  const auto found = std::ranges::find_if(rows, [&](const TrainingRow& row) {
+    return row.trainee == kExpert || row.trainee == person_->name || person_->instructor;
+  });
+  return found == rows.end() ? std::nullopt : std::optional(*found);
 }
 
-std::string TrainingDesk::AttemptJson(const std::string& session) const {
-  const fs::path folder = FolderOf(session);
-  if (folder.empty()) throw InputError("no attempt \"" + session + "\" of yours");
+fs::path TrainingDesk::FolderOf(const std::string& session) {
+  const std::optional<TrainingLog> log = Open();
+  return log && Find(*log, session) ? out_ / session : fs::path();
+}
+
+std::string TrainingDesk::DemonstrationOf(const TrainingLog& log, const std::string& scene) const {
+  std::vector<TrainingRow> rows = log.SessionsOf(kExpert, scene);
+  std::erase_if(rows, [&](const TrainingRow& row) {
+    std::error_code error;
+    return !row.well || !fs::is_regular_file(out_ / row.session / "recording.mcap", error);
+  });
+  double longest_s = 0;
+  for (const TrainingRow& row : rows) longest_s = std::max(longest_s, row.seconds);
+  std::string newest;
+  for (const TrainingRow& row : rows) {
+    if (row.seconds >= kComplete * longest_s) newest = row.session;
+  }
+  return newest;
+}
+
+std::string TrainingDesk::AttemptJson(const std::string& session) {
+  const std::optional<TrainingLog> log = Open();
+  const std::optional<TrainingRow> attempt = log ? Find(*log, session) : std::nullopt;
+  if (!attempt) throw InputError("no attempt \"" + session + "\" of yours");
+  const fs::path folder = out_ / session;
   const std::string sheet = TextOf(folder / "assessment.json");
   if (sheet.empty()) throw InputError(folder.string() + ": the session's folder is gone; its score is kept");
-  const TrainingLog log(database_, TrainingLog::Access::kRead);
-  std::string expert;
-  for (const TrainingRow& row : log.SessionsOf(kExpert, "")) {
-    if (session.ends_with("-" + row.scene)) expert = row.session;
-  }
+  const std::string expert = DemonstrationOf(*log, attempt->scene);
   Json json('{');
   json.Raw("sheet", sheet).Text("expert", expert);
   Json labels('{');

@@ -35,14 +35,12 @@ std::optional<double> PassOf(const std::string& scene, const std::vector<trainin
 
 }  // namespace
 
-TrainingGroup::TrainingGroup(const std::filesystem::path& database) {
-  std::error_code error;
-  if (!std::filesystem::exists(database, error)) return;
-  const TrainingLog log(database, TrainingLog::Access::kRead);
-  for (const auto& [trainee, count] : log.Trainees()) {
+TrainingGroup::TrainingGroup(const TrainingLog* log) {
+  if (log == nullptr) return;
+  for (const auto& [trainee, count] : log->Trainees()) {
     if (trainee == kExpert) continue;
-    sessions_[trainee] = log.SessionsOf(trainee, "");
-    if (const auto person = log.FindPerson(trainee); person && person->instructor) instructors_.insert(trainee);
+    sessions_[trainee] = log->SessionsOf(trainee, "");
+    if (const auto person = log->FindPerson(trainee); person && person->instructor) instructors_.insert(trainee);
   }
 }
 
@@ -102,7 +100,7 @@ std::string TrainingGroup::Csv(const std::string& trainee, const std::vector<tra
       for (const auto& [key, value] : row.measures) measures.insert(key);
     }
   }
-  std::ranges::stable_sort(lines, std::greater<>(), [](const Line& line) { return line.row->started_utc; });
+  std::ranges::sort(lines, std::greater<>(), [](const Line& line) { return line.row->id; });
   std::ostringstream csv;
   csv << "trainee,session,scene,started_utc,seconds,well,score_pct,attempt,pass_pct,passed,cohort_people,cohort_low_"
          "pct,"

@@ -1,7 +1,6 @@
 // All trainees of the database with their sessions: own results, and those of the others without names.
 #pragma once
 
-#include <filesystem>
 #include <map>
 #include <set>
 #include <string>
@@ -18,8 +17,8 @@ inline constexpr const char* kExpert = "Expert (script)";
 
 class TrainingGroup {
  public:
-  /// Reads the database; empty when the file is missing. Throws InputError.
-  explicit TrainingGroup(const std::filesystem::path& database);
+  /// Reads the database; null: nobody has a session. Throws InputError.
+  explicit TrainingGroup(const supervisor::TrainingLog* log);
 
   /// Sessions by trainee, oldest first; without the demonstrations.
   [[nodiscard]] const std::map<std::string, std::vector<supervisor::TrainingRow>>& sessions() const {

@@ -15,6 +15,7 @@
 #include "services/session/console/form.h"
 #include "services/session/console/library.h"
 #include "services/session/console/live_state.h"
+#include "services/session/console/opinion.h"
 #include "services/session/console/page.h"
 #include "services/session/console/router.h"
 #include "services/session/console/screen_text.h"
@@ -182,7 +183,9 @@ TEST(Router, FieldsAreCheckedByTheTable) {
                           "scene=a&seconds=-1", "scene=a&record=yes", "scene=a&more=1", "scene=a&picture_rate=1000"}) {
     EXPECT_EQ(StatusOf(Post("/api/start", bad)), 400) << bad;
   }
-  EXPECT_EQ(StatusOf(Post("/api/questionnaire/answers", "answers=0,1,2,3,4,5,0,1,2,3,4,5")), 200);
+  EXPECT_EQ(StatusOf(Post("/api/questionnaire/answers", "session=a&answers=0,1,2,3,4,5,0,1,2,3,4,5")), 200);
+  EXPECT_EQ(StatusOf(Post("/api/questionnaire/answers", "session=../a&answers=0,1,2,3,4,5,0,1,2,3,4,5")), 400);
+  EXPECT_EQ(StatusOf(Post("/api/questionnaire/answers", "answers=0,1,2,3,4,5,0,1,2,3,4,5")), 400) << "of which session";
   EXPECT_EQ(StatusOf(Post("/api/questionnaire/answers")), 400);
   EXPECT_EQ(StatusOf(Post("/api/restart", "node=physics_node")), 200);
   EXPECT_EQ(StatusOf(Post("/api/restart", "node=supervisor")), 400);
@@ -191,6 +194,11 @@ TEST(Router, FieldsAreCheckedByTheTable) {
   EXPECT_EQ(StatusOf(Get("/report?ticket=1")), 400);
   EXPECT_EQ(StatusOf(Post("/api/start", "scene=small&hands=on")), 200);
   EXPECT_EQ(StatusOf(Post("/api/start", "scene=small&hands=mouse")), 400);
+}
+
+TEST(Router, AStartNamesThePersonThatThePageShows) {
+  EXPECT_EQ(StatusOf(Post("/api/start", "scene=line&trainee=me&person=Ann%20M%C3%BCller")), 200);
+  EXPECT_EQ(StatusOf(Post("/api/start", "scene=line&trainee=me&person=")), 400);
 }
 
 TEST(Router, AWebSocketNeedsATicketAndThisPage) {
@@ -417,6 +425,23 @@ TEST(SessionRun, ItsEndIsNotThatOfASessionStartedElsewhere) {
   run.NoteBegun(5);
   EXPECT_FALSE(run.end());
   fs::remove_all(folder);
+}
+
+TEST(Opinion, AnswersGoToTheSessionThatTheyAreFor) {
+  const fs::path out = fs::temp_directory_path() / ("console_opinion_test." + std::to_string(::getpid()));
+  for (const char* session : {"1-ann", "2-bob"}) fs::create_directories(out / session);
+  fs::create_directory_symlink("2-bob", out / "latest");
+  const std::string answers = "0,1,2,3,4,5,0,1,2,3,4,5";
+  EXPECT_NE(QuestionsJson(out, "1-ann").find(R"("session":"1-ann")"), std::string::npos);
+  // The dialog was opened after the first session; the second has ended meanwhile.
+  StoreAnswers(out, "1-ann", "", answers);
+  EXPECT_TRUE(fs::exists(out / "1-ann/questionnaire.json"));
+  EXPECT_THROW(StoreAnswers(out, "2-bob", "2-bob", answers), InputError) << "it runs";
+  for (const char* wrong : {"", ".", "..", "latest", "3-cy", "1-ann/frames"}) {
+    EXPECT_THROW(StoreAnswers(out, wrong, "", answers), InputError) << wrong;
+  }
+  EXPECT_FALSE(fs::exists(out / "2-bob/questionnaire.json"));
+  fs::remove_all(out);
 }
 
 TEST(LiveState, ASessionThatWritesItsReportIsNotStarting) {

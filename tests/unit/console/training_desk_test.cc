@@ -26,14 +26,16 @@ class TrainingDeskTest : public testing::Test {
   }
   ~TrainingDeskTest() override { fs::remove_all(folder_); }
 
-  void Store(const std::string& trainee, const std::string& session, double score, bool well = true) {
+  void Store(const std::string& trainee, const std::string& session, double score, bool well = true,
+             double seconds = 10, const std::string& scene = "line") {
     TrainingLog(database_).Add(
-        {trainee, session, "line", "2026-01-0" + session.substr(8, 1), 10, well, score, {{"time_s", 9.5}}});
+        {trainee, session, scene, "2026-01-0" + session.substr(8, 1), seconds, well, score, {{"time_s", 9.5}}});
     fs::create_directories(folder_ / "out" / session / "frames");
     std::ofstream(folder_ / "out" / session / "assessment.json") << "{\"score_pct\": 1}";
     std::ofstream(folder_ / "out" / session / "frames/frame_0000100.png") << "x";
+    std::ofstream(folder_ / "out" / session / "recording.mcap") << "x";
   }
-  [[nodiscard]] std::string Overview() const { return desk_.OverviewJson({{"line", "Exercise: x", 9, 0, 2}}); }
+  [[nodiscard]] std::string Overview() { return desk_.OverviewJson({{"line", "Exercise: x", 9, 0, 2}}); }
 
   const fs::path folder_ = fs::temp_directory_path() / ("fulcrum_desk_test_" + std::to_string(::getpid()));
   const fs::path database_ = folder_ / "trainees.sqlite";
@@ -75,6 +77,70 @@ TEST_F(TrainingDeskTest, ComparesWithTheNewestDemonstration) {
   EXPECT_THROW(desk_.Create(kExpert, "2468", false), InputError) << "an account has the demonstrations' name";
 }
 
+TEST_F(TrainingDeskTest, ADemonstrationThatIsNotCompleteReplacesNone) {
+  desk_.Create("Ann", "2468", false);
+  // A session's folder gets "-2" when two begin in one second.
+  Store("Ann", "2026010-1-line-2", 60);
+  Store(kExpert, "2026010-2-line", 100, true, 20);
+  Store(kExpert, "2026010-3-line", 100, true, 19);
+  Store(kExpert, "2026010-4-line", 0, true, 2);  // Stopped by hand.
+  Store(kExpert, "2026010-5-line", 100, false, 30);
+  Store(kExpert, "2026010-6-line", 100, true, 30);
+  fs::remove_all(folder_ / "out/2026010-6-line");
+  Store(kExpert, "2026010-7-my-line", 100, true, 30, "my-line");
+  const std::string attempt = desk_.AttemptJson("2026010-1-line-2");
+  EXPECT_NE(attempt.find("\"expert\":\"2026010-3-line\""), std::string::npos) << attempt;
+}
+
+TEST_F(TrainingDeskTest, TheNewestIsTheLastThatEndedWhateverTheClockSaid) {
+  desk_.Create("Ann", "2468", false);
+  Store("Ann", "2026010-9-line", 60);
+  Store("Ann", "2026010-1-line", 80);  // The cart was started with a wrong clock.
+  Store(kExpert, "2026010-8-line", 100);
+  Store(kExpert, "2026010-2-line", 100);
+  EXPECT_NE(Overview().find("\"scores\":[60,80]"), std::string::npos) << Overview();
+  EXPECT_LT(Overview().find("2026010-1-line"), Overview().find("2026010-9-line")) << Overview();
+  EXPECT_NE(desk_.AttemptJson("2026010-1-line").find("\"expert\":\"2026010-2-line\""), std::string::npos);
+}
+
+TEST_F(TrainingDeskTest, AnotherPersonThanThePageShowsIsRefused) {
+  EXPECT_THROW(desk_.Expect(""), InputError) << "nobody";
+  desk_.Create("Ann", "2468", false);
+  EXPECT_NO_THROW(desk_.Expect("Ann"));
+  const std::uint64_t changes = desk_.person_changes();
+  desk_.Create("Bob", "2468", false);  // On another page.
+  EXPECT_GT(desk_.person_changes(), changes);
+  EXPECT_NO_THROW(desk_.Expect(""));
+  try {
+    desk_.Expect("Ann");
+    ADD_FAILURE() << "Ann's page begins a session for Bob";
+  } catch (const InputError& refusal) {
+    EXPECT_STREQ(refusal.what(), "Bob is at the cart now");
+  }
+}
+
+TEST_F(TrainingDeskTest, WhoIsDeletedIsAtTheCartNoMore) {
+  Store("Bob", "2026010-1-line", 60);
+  desk_.Create("Ines", "2468", true);
+  EXPECT_FALSE(desk_.FolderOf("2026010-1-line").empty());
+  const std::uint64_t changes = desk_.person_changes();
+  (void)TrainingLog(database_, TrainingLog::Access::kDelete).Delete("Ines");
+  EXPECT_TRUE(desk_.FolderOf("2026010-1-line").empty());
+  EXPECT_EQ(desk_.person(), "");
+  EXPECT_GT(desk_.person_changes(), changes);
+  EXPECT_EQ(Overview().find("Bob"), std::string::npos) << Overview();
+  EXPECT_THROW(desk_.Expect("Ines"), InputError);
+  // An account that was made anew is another person's.
+  desk_.Create("Ann", "2468", true);
+  TrainingLog log(database_, TrainingLog::Access::kDelete);
+  (void)log.Delete("Ann");
+  log.AddPerson({"Ann", "x", false});
+  EXPECT_EQ(desk_.Csv().find("Bob"), std::string::npos);
+  EXPECT_EQ(desk_.person(), "");
+  fs::remove(database_);
+  EXPECT_EQ(Overview().find("Bob"), std::string::npos) << Overview();
+}
+
 TEST_F(TrainingDeskTest, TheCohortHasNoNamesAndAtLeastThreeOthers) {
   Store("Ann", "2026010-1-line", 60);
   Store("Bob", "2026010-2-line", 10);
@@ -110,6 +176,14 @@ TEST_F(TrainingDeskTest, TheInstructorsTableHasEachTraineesBest) {
   EXPECT_NE(desk_.Csv().find("\"Bob\",\"2026010-4-line\",\"line\",\"2026-01-04\",10,0,100,,70,,,,,,9.5\r\n"),
             std::string::npos)
       << "a session of a failed cart is no attempt: " << desk_.Csv();
+}
+
+TEST_F(TrainingDeskTest, ARoundedScoreDoesNotPass) {
+  desk_.Create("Ann", "2468", false);
+  Store("Ann", "2026010-1-line", 69.97);
+  EXPECT_NE(Overview().find(R"("pass":70,"passed":false,"scores":[69.97])"), std::string::npos) << Overview();
+  Store("Ann", "2026010-2-line", 70);
+  EXPECT_NE(Overview().find("\"passed\":true"), std::string::npos) << Overview();
 }
 
 TEST_F(TrainingDeskTest, RefusesWrongPinsAndWaitsAfterThem) {

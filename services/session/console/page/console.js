@@ -150,6 +150,7 @@ function show(s) {
     showPicture();
   }
   live.show(s);
+  training.at(s.person_changes);
   showWarnings(s.warnings || []);
   showTask(s.task);
   if (s.notice && s.notice.number > noticed) {

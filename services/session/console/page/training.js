@@ -3,7 +3,7 @@
 // the page: all pages show the same.
 
 const training = (() => {
-  let shown = null, ran = false;
+  let shown = null, ran = false, seen;
 
   const item = (className, ...children) => {
     const element = make('li', className);
@@ -46,7 +46,7 @@ const training = (() => {
     const section = make('section'), list = make('ul');
     section.append(make('h3', '', course.name), make('p', 'hint', course.description), list);
     for (const exercise of course.exercises) {
-      const {scores, cohort} = exercise, best = Math.max(...scores), passed = best >= exercise.pass;
+      const {scores, cohort} = exercise, {passed} = exercise, best = Math.max(...scores);
       const what = make('span', 'what', exercise.description.replace(/^Exercise: /, '').replace(/^./, c => c.toUpperCase()));
       what.append(make('small', '', `Passed from ${percent(exercise.pass)}. ` + (scores.length ? `${scores.length} done, best ${percent(best)}.` : 'Not tried yet.')));
       const mark = make('span', passed ? 'mark level-good' : 'mark level-off', passed ? '●' : '○');
@@ -66,7 +66,10 @@ const training = (() => {
     const byHand = trainee === 'me';
     // The replay of the attempt draws its recording.
     const fields = {scene: exercise.scene, record: 'on', hands: byHand ? 'on' : 'off', trainee};
+    // Somebody else may have entered on another page: the console then refuses, and this page shows who.
+    if (byHand) fields.person = shown.person;
     if (await order('/api/start', fields, byHand ? 'Take the controls when the picture comes (on a cart with Touch devices: these), and press Stop when you have finished.' : 'The script shows how it is done.')) ran = byHand;
+    else load();
   }
 
   function showAttempt(attempt) {
@@ -178,6 +181,13 @@ const training = (() => {
 
   return {
     load,
+    /** Called with each state. @param changes number of times that the person at the cart has changed, on any page. */
+    at(changes) {
+      if (changes === seen) return;
+      const first = seen === undefined;
+      seen = changes;
+      if (!first) load();
+    },
     /** Called when a session has ended: an attempt that began here is shown. @param session empty if it did not begin. */
     async ended(session) {
       if (!ran) return;
