@@ -51,11 +51,13 @@ ExitCode Delete(const std::string& name, const Arguments& arguments) {
   TrainingLog log(DatabaseOf(arguments), TrainingLog::Access::kDelete);
   const std::vector<TrainingRow> rows = log.SessionsOf(name, "");
   const std::vector<fs::path> traces = FindTraces(out, name);
-  if (rows.empty() && traces.empty()) {
-    throw InputError("no session of \"" + name + "\" is stored, and no session folder in " + out.string() +
-                     " names this trainee. Stored sessions:\n" + ListOf(log));
+  const bool account = log.FindPerson(name).has_value();
+  if (rows.empty() && traces.empty() && !account) {
+    throw InputError("no session and no account of \"" + name + "\" is stored, and no session folder in " +
+                     out.string() + " names this trainee. Stored sessions:\n" + ListOf(log));
   }
   std::printf("%zu rows of \"%s\" in %s are deleted\n", rows.size(), name.c_str(), DatabaseOf(arguments).c_str());
+  if (account) std::printf("the account of \"%s\" is deleted\n", name.c_str());
   for (const fs::path& file : traces) std::printf("the name is removed from %s\n", file.c_str());
   if (const std::size_t elsewhere = Elsewhere(rows, out); elsewhere > 0) {
     std::printf("%zu of these sessions have no folder in %s; if it is elsewhere, repeat with --out DIR\n", elsewhere,
@@ -83,7 +85,8 @@ ExitCode Trainee(const Words& words) {
       ("scene", po::value<std::string>()->value_name("NAME")->default_value(""), "only sessions of this scene")  //
       ("svg", po::value<std::string>()->value_name("FILE"), "also write plots to FILE")                          //
       ("delete",
-       "delete the rows of trainee NAME from the database, and the name from the session folders in --out")  //
+       "delete the rows and the account of trainee NAME from the database, and the name from the session folders in "
+       "--out")  //
       ("out", po::value<std::string>()->value_name("DIR")->default_value("out"),
        "with --delete: folder of the session folders")  //
       ("yes", "with --delete: do not ask");

@@ -66,6 +66,16 @@ TEST_F(TraineeCommandTest, DeletesRowsAndNameAfterAConfirmation) {
   EXPECT_EQ(Trainee({"Ann", "--delete", "--yes", "--out", out().string()}), 2) << "nothing is left of Ann";
 }
 
+TEST_F(TraineeCommandTest, DeletesAnAccountWithoutSessions) {
+  // The only instructor has forgotten the PIN, and no other can be made while the account is there.
+  TrainingLog(database()).AddPerson({"Ines", "hash", true});
+  EXPECT_EQ(Trainee({"Ines", "--delete", "--yes", "--out", out().string()}), 0) << said_;
+  EXPECT_NE(said_.find("the account of \"Ines\" is deleted"), std::string::npos) << said_;
+  EXPECT_FALSE(TrainingLog(database()).FindPerson("Ines"));
+  EXPECT_FALSE(TrainingLog(database()).HasInstructor());
+  EXPECT_EQ(Trainee({"Ines", "--delete", "--yes", "--out", out().string()}), 2);
+}
+
 TEST_F(TraineeCommandTest, BadUseChangesNothing) {
   const std::string before = ReadFile(database());
   EXPECT_EQ(Trainee({"--delete", "--yes"}), 2);
