@@ -86,7 +86,7 @@ void TrainingDesk::Create(const std::string& name, const std::string& pin, bool 
 std::string TrainingDesk::OverviewJson(const std::vector<SceneChoice>& scenes) {
   const std::optional<TrainingLog> log = Open();
   const bool instructor = person_ && person_->instructor;
-  const TrainingGroup group(person_ && log ? &*log : nullptr);
+  const TrainingGroup group(person_ && log ? &*log : nullptr, TrainingLog::Rows::kWithoutMeasures);
   const std::vector<training::Course> all = training::ReadCourses(courses_);
   Json courses('[');
   for (const training::Course& course : all) {
@@ -150,7 +150,7 @@ fs::path TrainingDesk::FolderOf(const std::string& session) {
 }
 
 std::string TrainingDesk::DemonstrationOf(const TrainingLog& log, const std::string& scene) const {
-  std::vector<TrainingRow> rows = log.SessionsOf(kExpert, scene);
+  std::vector<TrainingRow> rows = log.SessionsOf(kExpert, scene, TrainingLog::Rows::kWithoutMeasures);
   std::erase_if(rows, [&](const TrainingRow& row) {
     std::error_code error;
     return !row.well || !fs::is_regular_file(out_ / row.session / "recording.mcap", error);

@@ -35,11 +35,11 @@ std::optional<double> PassOf(const std::string& scene, const std::vector<trainin
 
 }  // namespace
 
-TrainingGroup::TrainingGroup(const TrainingLog* log) {
+TrainingGroup::TrainingGroup(const TrainingLog* log, TrainingLog::Rows rows) {
   if (log == nullptr) return;
   for (const auto& [trainee, count] : log->Trainees()) {
     if (trainee == kExpert) continue;
-    sessions_[trainee] = log->SessionsOf(trainee, "");
+    sessions_[trainee] = log->SessionsOf(trainee, "", rows);
     if (const auto person = log->FindPerson(trainee); person && person->instructor) instructors_.insert(trainee);
   }
 }

@@ -18,7 +18,8 @@ inline constexpr const char* kExpert = "Expert (script)";
 class TrainingGroup {
  public:
   /// Reads the database; null: nobody has a session. Throws InputError.
-  explicit TrainingGroup(const supervisor::TrainingLog* log);
+  explicit TrainingGroup(const supervisor::TrainingLog* log,
+                         supervisor::TrainingLog::Rows rows = supervisor::TrainingLog::Rows::kWhole);
 
   /// Sessions by trainee, oldest first; without the demonstrations.
   [[nodiscard]] const std::map<std::string, std::vector<supervisor::TrainingRow>>& sessions() const {

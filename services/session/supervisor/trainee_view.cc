@@ -59,6 +59,8 @@ std::string TraineeSvg(const std::string& trainee, const std::vector<TrainingRow
   const auto add = [&](const std::string& title, const char* unit, const char* colour, const auto& value_of) {
     Curve curve;
     for (std::size_t i = 0; i < rows.size(); ++i) {
+      // As in the console's trends: the score of a failed cart does not assess the trainee.
+      if (!rows[i].well) continue;
       if (const double* value = value_of(rows[i])) curve.Add(static_cast<double>(i + 1), *value);
     }
     PlotSettings settings{.title = title, .unit = unit, .end_s = static_cast<double>(rows.size()), .marks_s = {}};

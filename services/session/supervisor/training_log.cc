@@ -309,7 +309,8 @@ int TrainingLog::Delete(const std::string& trainee) {
   return deleted;
 }
 
-std::vector<TrainingRow> TrainingLog::SessionsOf(const std::string& trainee, const std::string& scene) const {
+std::vector<TrainingRow> TrainingLog::SessionsOf(const std::string& trainee, const std::string& scene,
+                                                 Rows wanted) const {
   Statement sessions(database_.get(),
                      "SELECT id, session, scene, started_utc, seconds, well, score_pct FROM sessions "
                      "WHERE trainee = ?1 AND (?2 = '' OR scene = ?2) ORDER BY id");
@@ -327,6 +328,10 @@ std::vector<TrainingRow> TrainingLog::SessionsOf(const std::string& trainee, con
                     sessions.Number(6),
                     {},
                     sessions.Integer(0)};
+    if (wanted == Rows::kWithoutMeasures) {
+      rows.push_back(std::move(row));
+      continue;
+    }
     measures.Bind(1, sessions.Integer(0));
     while (measures.Next()) row.measures.emplace(measures.Text(0), measures.Number(1));
     if (!measures.good()) Fail("cannot be read");

@@ -59,8 +59,10 @@ class TrainingLog {
   void Add(const TrainingRow& row);
   /// Deletes account and all sessions of a trainee; nothing of them remains in the file's bytes. @return their number.
   int Delete(const std::string& trainee);
+  enum class Rows { kWhole, kWithoutMeasures };
   /// Sessions of a trainee in the order in which they ended, whatever the clock said. `scene` empty: of all scenes.
-  [[nodiscard]] std::vector<TrainingRow> SessionsOf(const std::string& trainee, const std::string& scene) const;
+  [[nodiscard]] std::vector<TrainingRow> SessionsOf(const std::string& trainee, const std::string& scene,
+                                                    Rows rows = Rows::kWhole) const;
   /// Rows of a session's name, without measures.
   [[nodiscard]] std::vector<TrainingRow> RowsOf(const std::string& session) const;
   /// Number of sessions by trainee.

@@ -137,6 +137,10 @@ TEST_F(TrainingLogTest, KeepsWhatIsAddedInItsOrder) {
   EXPECT_TRUE(rows[0].well);
   EXPECT_EQ(rows[0].measures, (std::map<std::string, double>{{"time_s", 23}, {"peak_force_N", 1.25}}));
   EXPECT_EQ(log.SessionsOf("Ann", "line").size(), 1u);
+  const auto short_rows = log.SessionsOf("Ann", "", TrainingLog::Rows::kWithoutMeasures);
+  ASSERT_EQ(short_rows.size(), 3u);
+  EXPECT_EQ(short_rows[2].score_pct, 90);
+  EXPECT_TRUE(short_rows[2].measures.empty());
   EXPECT_TRUE(log.SessionsOf("Bob", "").empty());
   const auto found = log.RowsOf("s-5");
   ASSERT_EQ(found.size(), 1u);
@@ -282,7 +286,7 @@ TEST(TraineeViewTest, TableAndPlotsShowEachSession) {
   EXPECT_NE(svg.find("A &amp; B, 4 sessions"), std::string::npos);
   std::size_t dots = 0;
   for (std::size_t at = svg.find("<circle"); at != std::string::npos; at = svg.find("<circle", at + 1)) ++dots;
-  EXPECT_EQ(dots, 12u) << "score, time and path length of four sessions";
+  EXPECT_EQ(dots, 9u) << "score, time and path length of the three sessions that ended well";
   EXPECT_TRUE(TraineeSvg("Ann", {}).empty());
 }
 

@@ -85,7 +85,7 @@ await withPage('quick presses of the generator\u2019s knobs all count', running(
 await withPage('a session that fails to start opens no older attempt', idle(), async ({page, console}) => {
   const attempt = session => ({trainee: 'Ann', session, scene: 'line', started: '2026-01-01 00:00:00 UTC', score: 83, well: true});
   const training = attempts => ({person: 'Ann', instructor: false, group: [], attempts,
-    courses: [{name: 'Basics', description: 'd', exercises: [{scene: 'line', description: 'Exercise: line', pass: 75, scores: [83], cohort: []}]}]});
+    courses: [{name: 'Basics', description: 'd', exercises: [{scene: 'line', description: 'Exercise: line', pass: 75, passed: true, scores: [83], cohort: []}]}]});
   console.answers['/api/training'] = training([attempt('20260101-000000-line')]);
   console.answers['/api/attempt'] = {sheet: {}, expert: '', labels: {}};
   console.answers['/api/attempt/events'] = {ready: true, why: '', events: [], left_out: 0};
