@@ -255,6 +255,9 @@ TEST_F(InstallTest, WhatServesOtherMachinesSaysHowTheyReachIt) {
   EXPECT_NE(settings.find("IPAddressAllow="), std::string::npos);
   // A host ends with each session.
   EXPECT_EQ(Unit("fulcrum-host.service").Value("Restart"), "always");
+  // No exit code tells a fault that passes, such as an unplugged cable at the start, from one that stays.
+  EXPECT_EQ(Unit("fulcrum-host.service").Value("RestartPreventExitStatus"), "");
+  EXPECT_EQ(Unit("fulcrum-host.service").Value("StartLimitIntervalSec"), "0");
 }
 
 TEST_F(InstallTest, SessionRunsFromTheInstalledPlaces) {
