@@ -1,41 +1,26 @@
 #include "thermal_node/heat/material.h"
 
+#include <array>
 #include <cmath>
-#include <string>
+#include <cstdio>
 
 #include "services/base/core/error.h"
-#include "services/base/core/sheet_heat.h"
+#include "services/base/core/thermal_bounds.h"
 
 namespace fulcrum::thermal {
 namespace {
 
-void Check(const char* name, float value, float low, float high) {
-  if (std::isfinite(value) && value >= low && value <= high) return;
-  throw InputError("thermal." + std::string(name) + " = " + std::to_string(value) + ": valid range is " +
-                   std::to_string(low) + " to " + std::to_string(high));
-}
-
+/// A scene file may hold other values; the reader of descriptions refuses them.
 void Validate(const ThermalParams& p) {
-  // The lower bound of cell_m keeps the explicit step affordable: at 25 um a 10 ms frame takes about 20 substeps.
-  Check("cell_m", p.cell_m, 2.5e-5f, 1e-3f);
-  Check("thickness_m", p.thickness_m, kSheetThicknessMin_m, kSheetThicknessMax_m);
-  Check("density_kg_m3", p.density_kg_m3, 500, 2000);
-  Check("heat_capacity_J_kgK", p.heat_capacity_J_kgK, 1000, 5000);
-  Check("conductivity_W_mK", p.conductivity_W_mK, kSheetConductivityMin_W_mK, kSheetConductivityMax_W_mK);
-  Check("latent_heat_J_m3", p.latent_heat_J_m3, 1e8f, 2.3e9f);
-  Check("body_temperature_C", p.body_temperature_C, 0, 60);
-  Check("h_top_W_m2K", p.h_top_W_m2K, 0, 1e4f);
-  Check("h_below_W_m2K", p.h_below_W_m2K, 0, 1e4f);
-  Check("h_tented_W_m2K", p.h_tented_W_m2K, 0, 1e4f);
-  Check("perfusion_per_s", p.perfusion_per_s, 0, 0.1f);
-  Check("sigma_S_m", p.sigma_S_m, kSheetSigmaMin_S_m, kSheetSigmaMax_S_m);
-  Check("sigma_per_K", p.sigma_per_K, 0, 0.05f);
-  Check("sigma_fat_S_m", p.sigma_fat_S_m, 0, 5);
-  Check("fat_depth_m", p.fat_depth_m, 1e-4f, 0.1f);
-  Check("v_max_V", p.v_max_V, 1, 5000);
-  Check("i_max_A", p.i_max_A, 0.01f, 20);
-  Check("hook_radius_m", p.hook_radius_m, 1e-4f, 2e-3f);
-  Check("shrink_max", p.shrink_max, 0, 0.5f);
+  for (const ThermalBound& bound : kThermalBounds) {
+    const float value = p.*bound.value;
+    const auto low = static_cast<float>(bound.low * bound.si), high = static_cast<float>(bound.high * bound.si);
+    if (std::isfinite(value) && value >= low && value <= high) continue;
+    std::array<char, 160> text{};
+    std::snprintf(text.data(), text.size(), "thermal.%s is %g; valid: %g to %g", bound.key,
+                  static_cast<double>(value) / bound.si, bound.low, bound.high);
+    throw InputError(text.data());
+  }
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <charconv>
 
+#include "services/base/core/thermal_bounds.h"
+
 namespace fulcrum::scene {
 
 using config::Range;
@@ -91,27 +93,19 @@ void ReadPhysics(StrictMap map, PhysicsParams* p) {
 void ReadThermal(StrictMap map, ThermalParams* t) {
   t->model = map.Choice("model", t->model, {{"accurate", ThermalModel::kAccurate}, {"paper", ThermalModel::kPaper}});
   ReadPaperForm(&map, t->model == ThermalModel::kPaper, "printed needs thermal.model paper", &t->as);
-  ReadSi(&map, "cell_um", Range::Between(10, 10000), &t->cell_m);
-  ReadSi(&map, "thickness_mm", Range::Between(0.01, 10), &t->thickness_m);
-  ReadSi(&map, "density_kg_m3", Range::Between(1, 1e5), &t->density_kg_m3);
-  ReadSi(&map, "heat_capacity_J_kgK", Range::Between(1, 1e5), &t->heat_capacity_J_kgK);
-  ReadSi(&map, "conductivity_W_mK", Range::Between(0, 1e4), &t->conductivity_W_mK);
-  ReadSi(&map, "latent_heat_J_m3", Range::Between(0, 1e11), &t->latent_heat_J_m3);
-  ReadSi(&map, "body_temperature_C", Range::Between(0, 60), &t->body_temperature_C);
-  ReadSi(&map, "h_top_W_m2K", Range::Between(0, 1e5), &t->h_top_W_m2K);
-  ReadSi(&map, "h_below_W_m2K", Range::Between(0, 1e5), &t->h_below_W_m2K);
-  ReadSi(&map, "h_tented_W_m2K", Range::Between(0, 1e5), &t->h_tented_W_m2K);
-  ReadSi(&map, "perfusion_per_s", Range::Between(0, 10), &t->perfusion_per_s);
-  ReadSi(&map, "sigma_S_m", Range::Between(1e-4, 100), &t->sigma_S_m);
-  ReadSi(&map, "sigma_per_K", Range::Between(0, 1), &t->sigma_per_K);
-  ReadSi(&map, "sigma_fat_S_m", Range::Between(0, 100), &t->sigma_fat_S_m);
-  ReadSi(&map, "fat_depth_mm", Range::Between(0.1, 1000), &t->fat_depth_m);
-  ReadSi(&map, "v_max_V", Range::Between(1, 1e4), &t->v_max_V);
-  ReadSi(&map, "i_max_A", Range::Between(0.001, 100), &t->i_max_A);
-  ReadSi(&map, "hook_radius_mm", Range::Between(0.01, 10), &t->hook_radius_m);
-  ReadSi(&map, "shrink_max", Range::Between(0, 0.5), &t->shrink_max);
+  for (const ThermalBound& bound : kThermalBounds) {
+    ReadSi(&map, bound.key, Range::Between(bound.low, bound.high), &(t->*bound.value));
+  }
   t->volume = map.Flag("volume", t->volume != 0) ? 1 : 0;
 }
+
+namespace {
+
+/// From the scope's tip to the middle of its picture [m]: it gives the direction of sight, and nothing nearer than 4 mm
+/// is drawn.
+constexpr float kLeastSight_m = 0.005f * (1 - 1e-6f);
+
+}  // namespace
 
 void ReadRender(StrictMap map, RenderParams* r, StereoParams* s) {
   ReadInteger(&map, "width", 16, 7680, &r->width);
@@ -120,6 +114,9 @@ void ReadRender(StrictMap map, RenderParams* r, StereoParams* s) {
   ReadSi(&map, "png_rate_Hz", Range::Between(0, 240), &r->png_rate_Hz);
   r->scope_tip_W = map.Vector3Si("scope_tip_mm", r->scope_tip_W, Range::Between(-1000, 1000));
   r->scope_target_W = map.Vector3Si("scope_target_mm", r->scope_target_W, Range::Between(-1000, 1000));
+  if ((r->scope_target_W - r->scope_tip_W).norm() < kLeastSight_m) {
+    map.Fail("scope_target_mm", "must be at least 5 mm from scope_tip_mm");
+  }
   r->fov_deg = static_cast<float>(map.Number("fov_deg", Decimal(r->fov_deg), Range::Between(10, 150)));
   r->scope_angle_deg =
       static_cast<float>(map.Number("scope_angle_deg", Decimal(r->scope_angle_deg), Range::Between(0, 90)));

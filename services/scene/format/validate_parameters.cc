@@ -141,6 +141,7 @@ void CheckParameters(const SceneView& s) {
   CheckAssessment(s.assessment);
   CheckPoint("scene", 0, r.scope_tip_W);
   CheckPoint("scene", 1, r.scope_target_W);
+  CheckRange("scene", "distance of the scope's target", 0, (r.scope_target_W - r.scope_tip_W).norm(), 0.004, 100);
   for (std::size_t i = 0; i < s.tools.size(); ++i) {
     const ToolDescription& tool = s.tools[i];
     if (tool.kind > ToolKind::kClipApplier) {

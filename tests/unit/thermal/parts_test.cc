@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "services/base/core/error.h"
+#include "services/base/core/thermal_bounds.h"
 #include "tests/numerics/thermal/flat_scene.h"
 #include "thermal_node/coupling/electrode.h"
 #include "thermal_node/coupling/film.h"
@@ -25,14 +26,25 @@ TEST(MaterialTest, RefusesBadParametersWithNameValueAndRange) {
     FAIL();
   } catch (const InputError& error) {
     const std::string text = error.what();
-    EXPECT_NE(text.find("thermal.thickness_m"), std::string::npos);
-    EXPECT_NE(text.find("0.3"), std::string::npos);
-    EXPECT_NE(text.find("range"), std::string::npos);
+    EXPECT_NE(text.find("thermal.thickness_mm is 300; valid: 0.01 to 5"), std::string::npos) << text;
   }
   params = {};
   params.sigma_S_m = NAN;
   EXPECT_THROW((void)MakeMaterial(params), InputError);
   EXPECT_NO_THROW((void)MakeMaterial(ThermalParams{}));
+}
+
+TEST(MaterialTest, TakesWhatTheReaderOfScenesTakes) {
+  for (const ThermalBound& bound : kThermalBounds) {
+    for (const double valid : {bound.low, bound.high}) {
+      ThermalParams params;
+      params.*bound.value = static_cast<float>(valid * bound.si);  // As StrictMap converts it.
+      EXPECT_NO_THROW((void)MakeMaterial(params)) << bound.key << ": " << valid;
+    }
+    ThermalParams params;
+    params.*bound.value = static_cast<float>(1.001 * bound.high * bound.si);
+    EXPECT_THROW((void)MakeMaterial(params), InputError) << bound.key;
+  }
 }
 
 TEST(MaterialTest, HeatCapacityAndConductivitiesFallAsTheTissueDries) {
