@@ -14,6 +14,14 @@ constexpr double kTimeToCut = 3.0;
 constexpr double kSpeedSpan = 0.1;       // Central difference for the tool's speed [s].
 constexpr double kMovingSpeed = 2.0e-3;  // A slower tool counts as holding [m/s].
 
+/// Session time of the tool's next key, at which the pedals of this one end.
+double EndOfKey(const SceneView& scene, const ScriptKey& key, double end_s) {
+  for (const ScriptKey& next : scene.script) {
+    if (next.tool == key.tool && next.time_s > key.time_s) end_s = std::min(end_s, static_cast<double>(next.time_s));
+  }
+  return end_s;
+}
+
 bool IsCutting(const ScriptPoint& point) { return point.pedals != kPedalNone && point.power_W > 0; }
 
 }  // namespace
@@ -64,9 +72,12 @@ ScriptDemands DemandsUntil(const SceneView& scene, double end_s) {
         scene.tools[key.tool].kind == ToolKind::kGrasper && key.jaw_rad < scene.physics.grasp_close_rad;
     demands.deformation |= (heating || grasping) && left >= kTimeToDeform;
     demands.grasp |= grasping && left >= kTimeToDeform;
-    // Coag opens nothing, and only sheets are cut.
-    demands.cut |= heating && scene.membrane.node_count() > 0 && (key.pedals & (kPedalCut | kPedalBlend)) != 0 &&
-                   left >= kTimeToCut;
+    // Coag opens nothing, of the tools only the hook has current, and only sheets are cut.
+    const bool cutting = heating && (key.pedals & (kPedalCut | kPedalBlend)) != 0 &&
+                         scene.tools[key.tool].kind == ToolKind::kHook && scene.membrane.node_count() > 0;
+    if (!cutting || left < kTimeToCut) continue;
+    demands.cut = true;
+    demands.cutting.push_back({static_cast<double>(key.time_s), EndOfKey(scene, key, end_s)});
   }
   return demands;
 }

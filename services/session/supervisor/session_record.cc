@@ -158,6 +158,23 @@ const Curve& SessionRecord::curve(const std::string& metric) const {
   return found == curves_.end() ? kNone : found->second;
 }
 
+namespace {
+
+/// The membrane had current while the script cut. Of a record that has not kept all events: at any time.
+bool CutCurrentInMembrane(const SessionRecord& record, const ScriptDemands& demands) {
+  // From the script's pedal to the event at the tip, and the other way round at the end of a pedal.
+  constexpr double kLate_s = 0.5;
+  if (!record.event_counts().contains(ThermalEventKind::kContact)) return false;
+  if (demands.cutting.empty() || record.events().size() == SessionRecord::kMostEvents) return true;
+  return std::ranges::any_of(record.events(), [&](const EventRecord& event) {
+    return event.kind == ThermalEventKind::kContact && std::ranges::any_of(demands.cutting, [&](const TimeSpan& span) {
+             return event.time_s >= span.begin_s && event.time_s <= span.end_s + kLate_s;
+           });
+  });
+}
+
+}  // namespace
+
 std::string MissingFrom(const SessionRecord& record, const ScriptDemands& demands) {
   const auto missing = [](const char* what, double value, double least) {
     char text[160];
@@ -166,13 +183,14 @@ std::string MissingFrom(const SessionRecord& record, const ScriptDemands& demand
     return std::string(text);
   };
   // Current in an organ and none in the membrane: the script burns organs, which cuts nothing and hardly moves them.
-  const bool organs_only = !record.burnt_m2().empty() && !record.event_counts().contains(ThermalEventKind::kContact);
+  const bool burns = !record.burnt_m2().empty();
+  const bool organs_only = burns && !record.event_counts().contains(ThermalEventKind::kContact);
   const double displacement = record.peak("max_displacement_mm");
   if (demands.deformation && displacement < kLeastDisplacement_mm && (demands.grasp || !organs_only)) {
     return missing("nothing was deformed", displacement, kLeastDisplacement_mm);
   }
   const double cut = record.peak("cut_length_mm");
-  if (demands.cut && cut < kLeastCut_mm && !organs_only) {
+  if (demands.cut && cut < kLeastCut_mm && (!burns || CutCurrentInMembrane(record, demands))) {
     return missing("nothing was cut", cut, kLeastCut_mm);
   }
   return {};

@@ -109,6 +109,14 @@ TEST(SessionRecordTest, ABurntOrganIsAnEffectAndAFigureOfItsName) {
   event.kind = ThermalEventKind::kContact;
   both.AddEvent(event);
   EXPECT_NE(MissingFrom(both, {.cut = true}), "") << "the hook had current in the membrane as well";
+  // Coagulated the membrane at 2 s, cut an organ's bed from 5 s on.
+  SessionRecord coagulated = record;
+  event.session_time_s = 2;
+  coagulated.AddEvent(event);
+  EXPECT_EQ(MissingFrom(coagulated, {.cut = true, .cutting = {{5, 9}}}), "");
+  event.session_time_s = 6;
+  coagulated.AddEvent(event);
+  EXPECT_NE(MissingFrom(coagulated, {.cut = true, .cutting = {{5, 9}}}), "") << "the hook slipped onto the membrane";
   SessionOutcome outcome;
   outcome.solids = {"organ", "cystic duct"};
   const std::vector<KeyFigure> figures = KeyFigures(outcome, record);
@@ -165,6 +173,13 @@ TEST_F(ScriptTest, DemandsGrowWithTheTimeGiven) {
   only_coag.script = coag;
   EXPECT_FALSE(DemandsUntil(only_coag, 20.0).cut);
   EXPECT_TRUE(DemandsUntil(only_coag, 20.0).deformation);
+  const ScriptDemands all = DemandsUntil(scene_, 20.0);
+  ASSERT_EQ(all.cutting.size(), 1u);
+  EXPECT_EQ(all.cutting[0].begin_s, 8);
+  EXPECT_EQ(all.cutting[0].end_s, 11);
+  SceneView without_hook = scene_;
+  without_hook.tools[1].kind = ToolKind::kGrasper;
+  EXPECT_FALSE(DemandsUntil(without_hook, 20.0).cut) << "only the hook has current";
 }
 
 // -------------------------------------------------------------------------------------------------- presentation
