@@ -21,7 +21,6 @@ constexpr float kMostReach_m = 1.0f;
 constexpr float kUnitTolerance = 1e-3f;
 /// Added to J's inverse over its trace: a set in one line has no stiffness about the line.
 constexpr double kLeastTurnStiffness = 1e-6;
-constexpr std::size_t kLeastClipped = 3;
 
 bool Has(const AppliedClip& clip, Index particle) {
   return std::any_of(clip.tissue.begin(), clip.tissue.end(),

@@ -32,6 +32,8 @@ namespace fulcrum::physics {
 
 /// Particles in a clip: those nearest to the middle line of its jaws.
 inline constexpr std::size_t kMostClipped = 48;
+/// A clip on fewer would have no frame of its own.
+inline constexpr std::size_t kLeastClipped = 3;
 
 struct ClippedParticle {
   Index particle = 0;

@@ -50,6 +50,27 @@ std::vector<Index> Grasp::InJaws(const ToolDescription& tool, const ToolPose& po
   return tissue;
 }
 
+std::vector<Index> Grasp::AcrossJaws(const ToolDescription& tool, const ToolPose& pose, float reach,
+                                     std::span<const Triangle> surface, const TissueModel& model,
+                                     const ParticleStore& particles) {
+  std::vector<Index> ends;
+  for (const Triangle& triangle : surface) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index a = triangle[k], b = triangle[(k + 1) % 3];
+      const Vec3f a_T = pose.ToTool(particles.At(particles.Ref(a))), b_T = pose.ToTool(particles.At(particles.Ref(b)));
+      if ((a_T.y() < 0.0f) == (b_T.y() < 0.0f)) continue;  // The jaws move in the plane y = 0.
+      const Vec3f at = a_T + a_T.y() / (a_T.y() - b_T.y()) * (b_T - a_T);
+      if (DistanceToJaws(at, tool, pose.jaw_rad) >= reach) continue;
+      for (const Index end : {a, b}) {
+        if (model.BaseInverseMass(end) > 0.0f) ends.push_back(end);
+      }
+    }
+  }
+  std::ranges::sort(ends);
+  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
+  return ends;
+}
+
 void Grasp::Update(const ToolDescription& tool, const ToolPose& pose, const TissueModel& model,
                    ParticleStore* particles) {
   if (tool.kind != ToolKind::kGrasper && tool.kind != ToolKind::kClipApplier) {

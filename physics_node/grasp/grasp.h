@@ -9,6 +9,7 @@
 //   v_c  kCreepSpeed [m/s], h: step [s]                   l, f     kLeastHold, kFirmShare
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "physics_node/collision/tool_shape.h"
@@ -36,6 +37,11 @@ class Grasp {
   /// Living tissue nearer than `reach` to the surface that the jaws span [m], also where a tool holds it.
   [[nodiscard]] static std::vector<Index> InJaws(const ToolDescription& tool, const ToolPose& pose, float reach,
                                                  const TissueModel& model, const ParticleStore& particles);
+  /// Ends of the living edges of bodies' surfaces that pass through the surface between the jaws, or nearer than `reach`
+  /// to it [m]: what lies between the jaws of a body whose vertices are farther apart than the jaws are thick.
+  [[nodiscard]] static std::vector<Index> AcrossJaws(const ToolDescription& tool, const ToolPose& pose, float reach,
+                                                     std::span<const Triangle> surface, const TissueModel& model,
+                                                     const ParticleStore& particles);
   /// Moves the held particles with the tool.
   void Move(const ToolPose& pose, ParticleStore* particles) const;
   /// Largest traction without slip at an opening angle [N]: grip_force_N when closed, falling linearly to 0 at

@@ -104,6 +104,12 @@ void TissueSimulation::ApplyClip(std::size_t tool) {
       if (is_new) tissue.push_back(p);
     }
   }
+  // The vertices of a duct may all lie beside the jaws that have closed on it.
+  if (tissue.size() < kLeastClipped) {
+    for (const Index p : Grasp::AcrossJaws(applier, pose, jaw, scene_.tube_surface, model_, particles_)) {
+      if (std::ranges::find(tissue, p) == tissue.end()) tissue.push_back(p);
+    }
+  }
   if (tissue.empty()) return;
   (void)clips_.Apply(static_cast<std::uint8_t>(tool), applier, pose, tissue, particles_);
 }

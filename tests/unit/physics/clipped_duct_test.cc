@@ -4,6 +4,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "physics_node/simulation/script_player.h"
 #include "tests/support/flat_sheets.h"
@@ -17,7 +19,9 @@ const Vec3f kDuctPull(0, 0.002f, 0.006f);
 
 /// A duct of 2 x 3 mm along y, between the open jaws without touching them, one end held. The applier (tool 0) comes
 /// along -z at y = 0; the grasper (tool 1) takes the other end and moves by kDuctPull.
-scene::SceneData Duct() {
+/// @param cells of the duct in x, y and z.
+/// @param shift_m along y of the duct, whose lines of vertices are 40 mm / cells[1] apart.
+scene::SceneData Duct(const std::array<int, 3>& cells = {2, 40, 3}, double shift_m = 0) {
   scene::SceneSettings settings = SheetSettings(PhysicsMode::kAccurate);
   settings.name = "duct";
   settings.tools = {};
@@ -43,8 +47,8 @@ scene::SceneData Duct() {
   key(kDuctPulled_s, 1, grip + tip + kDuctPull, 0);
   settings.script_duration_s = kDuctPulled_s + 1;
   scene::Anatomy anatomy;
-  anatomy.solids.push_back(Box("duct", {-0.001, -0.02, -0.005}, {0.002, 0.04, 0.003}, {2, 40, 3}, 1e5));
-  Fix(&anatomy.solids.back(), [](const Vec3d& p) { return p.y() < -0.0199; });
+  anatomy.solids.push_back(Box("duct", {-0.001, -0.02 + shift_m, -0.005}, {0.002, 0.04, 0.003}, cells, 1e5));
+  Fix(&anatomy.solids.back(), [&](const Vec3d& p) { return p.y() < -0.0199 + shift_m; });
   return scene::AssembleScene(settings, anatomy);
 }
 
@@ -90,6 +94,20 @@ TEST(ClippedDuct, IsHeldByAClipOnItsVertices) {
   // The pose of the topic is that of the held tissue.
   const Vec3d middle = rigid.topRightCorner<3, 1>();
   EXPECT_LT((after->p_WC.cast<double>() - middle).norm(), 0.0005);
+}
+
+TEST(ClippedDuct, TakesAClipBetweenItsVerticesToo) {
+  for (const double shift_m : {0.0, 0.001, 0.002, 0.003}) {
+    const scene::SceneData data = Duct({1, 10, 1}, shift_m);
+    const SceneView scene = data.View();
+    TissueSimulation simulation(scene, 1);
+    for (int step = 0; 0.01 * step < kDuctFree_s; ++step) simulation.Step(ScriptedTools(scene, 0.01 * step));
+    ASSERT_EQ(simulation.clips().count(), 1u) << shift_m;
+    const ClipMemory memory = simulation.clips().Save();
+    for (const ClippedParticle& clipped : memory.clips[0].tissue) {
+      EXPECT_LT(std::abs(scene.rest_position[clipped.particle].y()), 0.0041f) << "the next vertices to both sides";
+    }
+  }
 }
 
 }  // namespace
