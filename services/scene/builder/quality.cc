@@ -105,6 +105,23 @@ void MeasureMembrane(const SceneView& s, SceneQuality* q) {
 
 }  // namespace
 
+std::vector<bool> SheetsHeld(const SceneView& s) {
+  std::vector<bool> held(s.sheets.size(), false);
+  const std::vector<std::size_t> sheet_of = SheetOfRows(s);
+  for (const Binding& b : s.bindings) {
+    if (!held.empty()) held[sheet_of[(b.membrane - s.membrane.first) / s.membrane.cols]] = true;
+  }
+  for (std::size_t i = 0; i < held.size(); ++i) {
+    const SheetPart& sheet = s.sheets[i];
+    for (Index row = sheet.first_row; row < sheet.first_row + sheet.rows; ++row) {
+      for (Index col = 0; col < sheet.cols; ++col) {
+        if (s.inverse_mass[s.membrane.first + row * s.membrane.cols + col] == 0) held[i] = true;
+      }
+    }
+  }
+  return held;
+}
+
 double AtlasMetric::area() const { return std::sqrt(std::max(ss * tt - st * st, 0.0)); }
 
 std::array<double, 2> AtlasMetric::stretches() const {
@@ -171,23 +188,13 @@ std::string Describe(const SceneView& s, const SceneQuality& q) {
       : s.solids.empty()                           ? "  vertices   %zu: organ %zu, membrane %u x %u"
                                                    : "  vertices   %zu: solids %zu, membrane %u x %u",
       q.vertices, q.organ_vertices, s.membrane.rows, s.membrane.cols);
-  std::vector<bool> is_bound(s.sheets.size(), false);
-  const std::vector<std::size_t> sheet_of = SheetOfRows(s);
-  for (const Binding& b : s.bindings) {
-    if (!s.sheets.empty()) is_bound[sheet_of[(b.membrane - s.membrane.first) / s.membrane.cols]] = true;
-  }
+  const std::vector<bool> is_held = SheetsHeld(s);
   for (std::size_t i = 0; i < s.sheets.size(); ++i) {
     const SheetPart& sheet = s.sheets[i];
-    bool is_held = is_bound[i];
-    for (Index row = sheet.first_row; row < sheet.first_row + sheet.rows; ++row) {
-      for (Index col = 0; col < sheet.cols; ++col) {
-        is_held = is_held || s.inverse_mass[s.membrane.first + row * s.membrane.cols + col] == 0;
-      }
-    }
     add("  sheet      %s: %u x %u, %.3g mm%s%s", sheet.name, sheet.rows, sheet.cols,
         1e3 * static_cast<double>(ThermalOf(sheet, s.thermal).thickness_m),
         IsSpanned(sheet) ? ", air on both sides" : "",
-        is_held ? "" : "; neither held nor bound, so nothing keeps it in its place");
+        is_held[i] ? "" : "; neither held nor bound, so nothing keeps it in its place");
   }
   for (const Solid& solid : s.solids) {
     add("  body       %s: %u vertices, %.3g kPa", solid.name, solid.vertex_count,
@@ -245,6 +252,9 @@ std::string Describe(const SceneView& s, const SceneQuality& q) {
       s.static_triangles.size(), s.protected_structures.size());
   add("  script     %.1f s, %zu keys, at most %.0f mm from the trocar", static_cast<double>(s.script_duration_s),
       s.script.size(), 1e3 * q.largest_reach_m);
+  for (std::size_t i = 0; i < s.tools.size(); ++i) {
+    if (s.tools[i].kind == ToolKind::kScissors) add("  scissors   tool%zu: they push tissue aside and cut nothing", i);
+  }
   add("  hash       %016llx", static_cast<unsigned long long>(s.hash));
   return text;
 }

@@ -44,6 +44,9 @@ struct SceneQuality {
 
 SceneQuality Measure(const SceneView& scene);
 
+/// By sheet that the scene lists: something keeps it in its place, a fixed node or a binding.
+[[nodiscard]] std::vector<bool> SheetsHeld(const SceneView& scene);
+
 /// The figures as text, one line per figure, each with its unit.
 std::string Describe(const SceneView& scene, const SceneQuality& quality);
 

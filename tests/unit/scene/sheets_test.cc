@@ -143,6 +143,10 @@ TEST_F(ThreeSheets, AreWrittenReadAndDescribed) {
   EXPECT_NE(text.find("capsule: 25 x 15, 0.3 mm"), std::string::npos) << text;
   EXPECT_NE(text.find("band: 21 x 2, 0.3 mm, air on both sides"), std::string::npos) << text;
   EXPECT_EQ(text.find("nan"), std::string::npos) << text;
+  EXPECT_EQ(text.find("scissors"), std::string::npos) << text;
+  SceneView other = scene_;
+  other.tools[2].kind = ToolKind::kScissors;
+  EXPECT_NE(Describe(other, Measure(other)).find("tool2: they push tissue aside and cut nothing"), std::string::npos);
 }
 
 TEST_F(ThreeSheets, AreRefusedWhereTheyDoNotFitTheGrid) {
@@ -234,6 +238,23 @@ TEST(Sheets, SayThatNothingKeepsOneInItsPlace) {
       "[50, 50]}, last: {x_mm: [0, 9], y_mm: [20, 20], z_mm: [50, 50]}}}]\n";
   const SceneData data = Build(kPad + loose);
   EXPECT_NE(Describe(data.View(), Measure(data.View())).find("neither held nor bound"), std::string::npos);
+}
+
+TEST(Sheets, AreNoCrumbsFromTheStart) {
+  const auto gauze = [](const std::string& keys) {
+    return std::string(kPad) + "sheets: [{name: gauze, " + keys +
+           ", between: {first: {x_mm: [0, 9], y_mm: [0, 0], z_mm: [50, 50]}, "
+           "last: {x_mm: [0, 9], y_mm: [9, 9], z_mm: [50, 50]}}}]\n";
+  };
+  try {
+    (void)Build(gauze("rows: 6, cols: 6, held: none"));
+    FAIL() << "36 loose nodes, which no picture would show";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("sheet 'gauze' has 36 nodes and is neither held"), std::string::npos)
+        << error.what();
+  }
+  EXPECT_NO_THROW((void)Build(gauze("rows: 7, cols: 6, held: none")));
+  EXPECT_NO_THROW((void)Build(gauze("rows: 6, cols: 6, held: ends")));
 }
 
 TEST(Sheets, AreRefusedWithThePlaceOfTheFault) {
