@@ -67,7 +67,7 @@ Atlas::Atlas(const SceneView& scene) : texel_m_(scene.membrane.texel_m) {
   blocks_x_ = (width_ + kBlock - 1) / kBlock;
   covered_.assign(static_cast<std::size_t>(blocks_x_) * ((height_ + kBlock - 1) / kBlock), 0);
   touched_ = cut_ = marked_ = covered_;
-  const auto body = static_cast<std::uint8_t>(std::lround((scene.thermal.body_temperature_C - 20.0f) * 2));
+  const std::uint8_t body = TemperatureByte(scene.thermal.body_temperature_C);
   texels_.resize(4u * static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
   if (body > kWarm) std::ranges::fill(marked_, std::uint8_t{1});
   for (std::size_t i = 0; i < texels_.size(); i += 4) {

@@ -33,7 +33,7 @@ BurnAtlas::BurnAtlas(const SolidCharts& charts, float body_temperature_C) {
   const auto rounded = [](std::int32_t texels) { return (texels + kRoundedTo - 1) / kRoundedTo * kRoundedTo; };
   width_ = rounded(charts.width);
   height_ = rounded(charts.height);
-  intact_ = {static_cast<std::uint8_t>(std::lround((body_temperature_C - 20.0f) * 2)), 0, 0, 255};
+  intact_ = {TemperatureByte(body_temperature_C), 0, 0, 255};
   texels_.resize(4 * static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
   for (std::size_t i = 0; i < texels_.size(); i += 4) std::memcpy(texels_.data() + i, intact_.data(), 4);
   for (const SolidChart& chart : charts.charts) boxes_.push_back({chart.x, chart.y, chart.width, chart.height});

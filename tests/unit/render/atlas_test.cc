@@ -172,6 +172,10 @@ TEST_F(AtlasTest, WhatShowsAHistoryIsNoLongerUntouchedAndTheRestIs) {
   SceneView hot = view_;
   hot.thermal.body_temperature_C = 42;
   EXPECT_FALSE(Atlas(hot).Untouched(corner, corner));
+  SceneView cold = view_;
+  cold.thermal.body_temperature_C = 15;  // Colder than a texel can say.
+  EXPECT_EQ(Atlas(cold).texels()[0], 0);
+  EXPECT_TRUE(Atlas(cold).Untouched(corner, corner));
 }
 
 TEST_F(AtlasTest, WhatAPatchSaidIsNotPaintedOver) {
