@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <functional>
 #include <iterator>
 
 #include "services/base/core/error.h"
@@ -153,8 +154,10 @@ std::string TrainingDesk::DemonstrationOf(const TrainingLog& log, const std::str
   std::vector<TrainingRow> rows = log.SessionsOf(kExpert, scene, TrainingLog::Rows::kWithoutMeasures);
   std::erase_if(rows, [&](const TrainingRow& row) {
     std::error_code error;
-    return !row.well || !fs::is_regular_file(out_ / row.session / "recording.mcap", error);
+    return !fs::is_regular_file(out_ / row.session / "recording.mcap", error);
   });
+  // One of a failed cart, for example of a machine that is too slow, is better than none.
+  if (std::ranges::any_of(rows, &TrainingRow::well)) std::erase_if(rows, std::not_fn(std::mem_fn(&TrainingRow::well)));
   double longest_s = 0;
   for (const TrainingRow& row : rows) longest_s = std::max(longest_s, row.seconds);
   std::string newest;

@@ -51,7 +51,8 @@ class TrainingDesk {
   /// A session's row; nullopt: the person may not see it.
   [[nodiscard]] std::optional<supervisor::TrainingRow> Find(const supervisor::TrainingLog& log,
                                                             const std::string& session) const;
-  /// Name of the newest complete demonstration of a scene that has a recording; empty: none.
+  /// Name of the newest complete demonstration of a scene that has a recording, of those that ended well if there are
+  /// any; empty: none.
   [[nodiscard]] std::string DemonstrationOf(const supervisor::TrainingLog& log, const std::string& scene) const;
 
   std::filesystem::path database_, courses_, out_;

@@ -81,6 +81,9 @@ TEST_F(TrainingDeskTest, ADemonstrationThatIsNotCompleteReplacesNone) {
   desk_.Create("Ann", "2468", false);
   // A session's folder gets "-2" when two begin in one second.
   Store("Ann", "2026010-1-line-2", 60);
+  Store(kExpert, "2026010-1-line", 100, false, 20);
+  EXPECT_NE(desk_.AttemptJson("2026010-1-line-2").find("\"expert\":\"2026010-1-line\""), std::string::npos)
+      << "better than none";
   Store(kExpert, "2026010-2-line", 100, true, 20);
   Store(kExpert, "2026010-3-line", 100, true, 19);
   Store(kExpert, "2026010-4-line", 0, true, 2);  // Stopped by hand.
