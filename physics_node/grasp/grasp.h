@@ -37,8 +37,8 @@ class Grasp {
   /// Living tissue nearer than `reach` to the surface that the jaws span [m], also where a tool holds it.
   [[nodiscard]] static std::vector<Index> InJaws(const ToolDescription& tool, const ToolPose& pose, float reach,
                                                  const TissueModel& model, const ParticleStore& particles);
-  /// Ends of the living edges of bodies' surfaces that pass through the surface between the jaws, or nearer than `reach`
-  /// to it [m]: what lies between the jaws of a body whose vertices are farther apart than the jaws are thick.
+  /// Ends of the living edges of bodies' surfaces that pass through the surface between the jaws, or nearer than
+  /// `reach` to it [m]: what lies between the jaws of a body whose vertices are farther apart than the jaws are thick.
   [[nodiscard]] static std::vector<Index> AcrossJaws(const ToolDescription& tool, const ToolPose& pose, float reach,
                                                      std::span<const Triangle> surface, const TissueModel& model,
                                                      const ParticleStore& particles);

@@ -2,11 +2,10 @@
 // with the pedal down.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <limits>
 #include <optional>
 #include <vector>
-
-#include <Eigen/Geometry>
 
 #include "services/base/core/scene_view.h"
 

@@ -21,9 +21,9 @@ struct TimeSpan {
 
 /// Effects that a run up to some session time must show.
 struct ScriptDemands {
-  bool deformation = false;  ///< The script grasps, or works with the hook.
-  bool cut = false;          ///< The script cuts with the hook, and there is a sheet to cut.
-  bool grasp = false;        ///< The script grasps.
+  bool deformation = false;            ///< The script grasps, or works with the hook.
+  bool cut = false;                    ///< The script cuts with the hook, and there is a sheet to cut.
+  bool grasp = false;                  ///< The script grasps.
   std::vector<TimeSpan> cutting = {};  ///< When it demands the cut; empty: at any time.
 };
 /// Demands of the script up to session time `end_s` [s], without actions so shortly before it that the tissue cannot
