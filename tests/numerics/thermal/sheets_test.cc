@@ -375,9 +375,9 @@ TEST(SheetsTest, BadOnesAreRefused) {
   EXPECT_EQ(refusal([](scene::SceneData*) {}), "");
   EXPECT_NE(refusal([](scene::SceneData* d) {
               d->sheets[1].thickness_m = 0.3f;
-            }).find("sheet 'sheet 2': thermal.thickness_m = 0.3"),
+            }).find("sheet 'sheet 2': thermal.thickness_mm is 300"),
             std::string::npos);
-  EXPECT_NE(refusal([](scene::SceneData* d) { d->sheets[1].sigma_S_m = 50; }).find("thermal.sigma_S_m = 50"),
+  EXPECT_NE(refusal([](scene::SceneData* d) { d->sheets[1].sigma_S_m = 50; }).find("thermal.sigma_S_m is 50"),
             std::string::npos);
   EXPECT_NE(refusal([](scene::SceneData* d) {
               d->fixed.thermal.cell_m = 1e-3f;
