@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <cstdio>
 
 #include "services/apps/fulcrum/commands.h"
@@ -200,10 +199,7 @@ ExitCode Up(const Words& words) {
   if (values.count("trainee") != 0) {
     settings.trainee = values["trainee"].as<std::string>();
     CheckTraineeName(settings.trainee);
-    const auto person = [](const config::DeviceConfig& device) {
-      return device.kind == config::DeviceKind::kTouch || device.kind == config::DeviceKind::kOperator;
-    };
-    if (values.count("hands") == 0 && std::ranges::none_of(settings.cart.devices, person)) {
+    if (values.count("hands") == 0 && !config::HasTouch(settings.cart) && !config::IsOperated(settings.cart)) {
       throw InputError("--trainee: this cart has no Touch, so the scene's script would operate, and its score be " +
                        settings.trainee + "'s; add --hands mouse or browser (--hands script to store it all the same)");
     }
