@@ -17,7 +17,7 @@ inline constexpr const char* kExpert = "Expert (script)";
 
 class TrainingGroup {
  public:
-  /// Reads the database; null: nobody has a session. Throws InputError.
+  /// Reads the database; null: as a database without sessions. Throws InputError.
   explicit TrainingGroup(const supervisor::TrainingLog* log,
                          supervisor::TrainingLog::Rows rows = supervisor::TrainingLog::Rows::kWhole);
 

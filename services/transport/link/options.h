@@ -19,8 +19,8 @@ namespace fulcrum::link {
 /// Inverse of NodesFromNames: "thermal_node,render_node".
 [[nodiscard]] std::string NamesOfNodes(std::uint32_t nodes);
 
-/// Domain of a link for which nobody names a domain: the same for every user, because the two ends often run as
-/// different users, and the domain of a cart that names none depends on the user.
+/// Domain of a link where neither option nor cart file gives one: the same for every user, because the two ends often
+/// run as different users, and the domain of a cart that names none depends on the user.
 inline constexpr int kUsualLinkDomain = bus::kFirstLinkDomain;
 /// Domain of the link. @param given value of --link-domain; 0: not given. @param cart_domain domain that an option or
 /// the cart file gives; the link's is 100 more. Without both: kUsualLinkDomain.
